@@ -1,0 +1,18 @@
+//! The wire between host and rig, and the device-side core that a microcontroller and the
+//! simulated board run alike. `PROTOCOL.md` beside this crate is normative.
+//!
+//! No networking, no clock, no heap: bytes and the time come in as arguments, bytes and events
+//! are polled out. The crate does not know angles or radiance: positions are counts, readings
+//! are ADC counts.
+#![no_std]
+
+mod board;
+mod message;
+mod time;
+
+pub use board::{Board, BoardFault, Illumination};
+pub use message::{
+    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult,
+    Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
+};
+pub use time::{Instant, Tick, TickUnwrapper};

@@ -1,0 +1,336 @@
+//! One table of a document: values by key, checked as they are read.
+
+use std::cell::RefCell;
+use std::ops::{Range, RangeInclusive};
+
+use crate::value::{Entries, Kind, Value};
+use crate::{Bounds, Problem, Source};
+
+/// Two words this many edits apart, or fewer, are offered as each other's correction.
+const NEAREST_EDITS_MAX: usize = 4;
+
+/// A table being read. Ask for each key that may stand in it, then call [`Table::finish`].
+#[derive(Debug)]
+pub struct Table<'d> {
+    source: &'d Source,
+    path: String,
+    span: Range<usize>,
+    entries: &'d Entries,
+    asked: RefCell<Vec<String>>,
+}
+
+impl<'d> Table<'d> {
+    pub(crate) fn new(
+        source: &'d Source,
+        path: String,
+        span: Range<usize>,
+        entries: &'d Entries,
+    ) -> Self {
+        Self { source, path, span, entries, asked: RefCell::new(Vec::new()) }
+    }
+
+    /// A finite number inside `bounds`; an integer is taken as a number.
+    pub fn number(&self, key: &str, bounds: Bounds) -> Result<Option<f64>, Problem> {
+        self.look_up(key).map(|value| self.read_number(key, value, bounds)).transpose()
+    }
+
+    /// As [`Table::number`], but it must be there.
+    pub fn required_number(&self, key: &str, bounds: Bounds) -> Result<f64, Problem> {
+        self.number(key, bounds)?.ok_or_else(|| self.missing(key, &bounds.to_string()))
+    }
+
+    /// An integer inside `range`.
+    pub fn integer(&self, key: &str, range: RangeInclusive<i64>) -> Result<Option<i64>, Problem> {
+        let expected = format!("an integer from {} to {}", range.start(), range.end());
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        match value.kind {
+            Kind::Integer(integer) if range.contains(&integer) => Ok(Some(integer)),
+            _ => Err(self.unexpected(key, value, &expected)),
+        }
+    }
+
+    /// As [`Table::integer`], but it must be there.
+    pub fn required_integer(&self, key: &str, range: RangeInclusive<i64>) -> Result<i64, Problem> {
+        let expected = format!("an integer from {} to {}", range.start(), range.end());
+        self.integer(key, range)?.ok_or_else(|| self.missing(key, &expected))
+    }
+
+    /// A string that is not empty.
+    pub fn text(&self, key: &str) -> Result<Option<&'d str>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        match &value.kind {
+            Kind::Text(text) if !text.trim().is_empty() => Ok(Some(text)),
+            _ => Err(self.unexpected(key, value, "a text that is not empty, in quotes")),
+        }
+    }
+
+    /// As [`Table::text`], but it must be there.
+    pub fn required_text(&self, key: &str) -> Result<&'d str, Problem> {
+        self.text(key)?.ok_or_else(|| self.missing(key, "a text in quotes"))
+    }
+
+    /// `true` or `false`.
+    pub fn flag(&self, key: &str) -> Result<Option<bool>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        match value.kind {
+            Kind::Boolean(flag) => Ok(Some(flag)),
+            _ => Err(self.unexpected(key, value, "true or false")),
+        }
+    }
+
+    /// One of a few words, each with what it stands for.
+    pub fn choice<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        choices
+            .iter()
+            .find(|(word, _)| matches!(&value.kind, Kind::Text(found) if found == word))
+            .map(|(_, meaning)| Some(meaning.clone()))
+            .ok_or_else(|| self.unexpected(key, value, &one_of(choices)))
+    }
+
+    /// As [`Table::choice`], but it must be there.
+    pub fn required_choice<T: Clone>(
+        &self,
+        key: &str,
+        choices: &[(&str, T)],
+    ) -> Result<T, Problem> {
+        self.choice(key, choices)?.ok_or_else(|| self.missing(key, &one_of(choices)))
+    }
+
+    /// A list of numbers, each inside `bounds`, as many as `len` allows.
+    pub fn numbers(
+        &self,
+        key: &str,
+        bounds: Bounds,
+        len: RangeInclusive<usize>,
+    ) -> Result<Option<Vec<f64>>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        let expected = format!("a list of {} to {} numbers, each {bounds}", len.start(), len.end());
+        let list = match &value.kind {
+            Kind::Array(list) if len.contains(&list.len()) => list,
+            _ => return Err(self.unexpected(key, value, &expected)),
+        };
+        list.iter()
+            .map(|item| self.read_number(key, item, bounds))
+            .collect::<Result<_, _>>()
+            .map(Some)
+    }
+
+    /// `[low, high]` with `low < high`, both inside `bounds`.
+    pub fn interval(&self, key: &str, bounds: Bounds) -> Result<Option<(f64, f64)>, Problem> {
+        let Some(pair) = self.numbers(key, bounds, 2..=2)? else { return Ok(None) };
+        if pair[0] < pair[1] {
+            return Ok(Some((pair[0], pair[1])));
+        }
+        Err(self.problem(
+            key,
+            &format!("{} is not below {}", pair[0], pair[1]),
+            "[low, high] with low below high",
+            "swap the two numbers, or widen the interval",
+        ))
+    }
+
+    /// As [`Table::interval`], but it must be there.
+    pub fn required_interval(&self, key: &str, bounds: Bounds) -> Result<(f64, f64), Problem> {
+        self.interval(key, bounds)?
+            .ok_or_else(|| self.missing(key, "[low, high] with low below high"))
+    }
+
+    /// A table within this one.
+    pub fn table(&self, key: &str) -> Result<Option<Table<'d>>, Problem> {
+        self.look_up(key).map(|value| self.read_table(key, key, value)).transpose()
+    }
+
+    /// As [`Table::table`], but it must be there.
+    pub fn required_table(&self, key: &str) -> Result<Table<'d>, Problem> {
+        self.table(key)?.ok_or_else(|| self.missing(key, "a table"))
+    }
+
+    /// A list of tables (`[[key]]`), empty if the key is absent.
+    pub fn tables(&self, key: &str) -> Result<Vec<Table<'d>>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(Vec::new()) };
+        let Kind::Array(list) = &value.kind else {
+            return Err(self.unexpected(key, value, "a list of tables ([[key]])"));
+        };
+        list.iter()
+            .enumerate()
+            .map(|(i, item)| self.read_table(key, &format!("{key}[{i}]"), item))
+            .collect()
+    }
+
+    /// Whether the key stands in the file. Does not count as asking for it.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.get(key).is_some()
+    }
+
+    /// Knows the key without reading it: somebody else will.
+    pub fn leave(&self, key: &str) {
+        self.asked.borrow_mut().push(key.to_owned());
+    }
+
+    /// Refuses every key that was not asked for.
+    pub fn finish(self) -> Result<(), Problem> {
+        let asked = self.asked.borrow();
+        let is_asked = |key: &str| asked.iter().any(|known| known == key);
+        let Some(unknown) = self.entries.iter().find(|entry| !is_asked(&entry.key)) else {
+            return Ok(());
+        };
+        let help = nearest(&unknown.key, &asked).map_or_else(
+            || "remove it, or move it to the table that it belongs to".to_owned(),
+            |near| format!("did you mean `{near}`?"),
+        );
+        let known = if asked.is_empty() {
+            "no key here".into()
+        } else {
+            format!("one of: {}", asked.join(", "))
+        };
+        let key = self.dotted(&unknown.key);
+        Err(Problem::at(self.source, unknown.key_span.clone(), &key, "unknown key", &known, &help))
+    }
+
+    /// A problem at `key`'s value, or at this table where the key is absent: for what only the
+    /// reader of this file can know (two keys that contradict each other, say).
+    pub fn problem(&self, key: &str, what: &str, expected: &str, help: &str) -> Problem {
+        let span =
+            self.entries.get(key).map_or_else(|| self.span.clone(), |value| value.span.clone());
+        Problem::at(self.source, span, &self.dotted(key), what, expected, help)
+    }
+
+    /// The file that this table stands in.
+    pub fn source(&self) -> &'d Source {
+        self.source
+    }
+
+    fn look_up(&self, key: &str) -> Option<&'d Value> {
+        self.leave(key);
+        self.entries.get(key)
+    }
+
+    fn read_number(&self, key: &str, value: &Value, bounds: Bounds) -> Result<f64, Problem> {
+        let number = match value.kind {
+            Kind::Float(number) => number,
+            Kind::Integer(integer) => integer as f64,
+            _ => f64::NAN,
+        };
+        if bounds.contain(number) {
+            return Ok(number);
+        }
+        Err(self.unexpected(key, value, &bounds.to_string()))
+    }
+
+    fn read_table(&self, key: &str, name: &str, value: &'d Value) -> Result<Table<'d>, Problem> {
+        let Kind::Table(entries) = &value.kind else {
+            return Err(self.unexpected(key, value, "a table"));
+        };
+        Ok(Table::new(self.source, self.dotted(name), value.span.clone(), entries))
+    }
+
+    fn missing(&self, key: &str, expected: &str) -> Problem {
+        Problem::at(
+            self.source,
+            self.span.clone(),
+            &self.dotted(key),
+            "missing key",
+            expected,
+            &format!("add `{key} = ...` here"),
+        )
+    }
+
+    fn unexpected(&self, key: &str, value: &Value, expected: &str) -> Problem {
+        let span = value.span.clone();
+        let found = self.source.text().get(span.clone()).unwrap_or_default();
+        let found: String = found.lines().next().unwrap_or_default().chars().take(60).collect();
+        let what = format!("found {} {found}", value.kind.name());
+        Problem::at(self.source, span, &self.dotted(key), &what, expected, "")
+    }
+
+    fn dotted(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+}
+
+fn one_of<T>(choices: &[(&str, T)]) -> String {
+    let words: Vec<String> = choices.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+    format!("one of {}", words.join(", "))
+}
+
+fn nearest<'a>(word: &str, known: &'a [String]) -> Option<&'a String> {
+    known
+        .iter()
+        .map(|candidate| (edits(word, candidate), candidate))
+        .filter(|(distance, candidate)| *distance <= NEAREST_EDITS_MAX.min(candidate.len() / 2 + 1))
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Levenshtein's distance (1966): insertions, deletions and substitutions of characters.
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(from != *to);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Document;
+
+    fn document(text: &str) -> Document {
+        Document::parse(Source::new("rig.toml", text)).unwrap()
+    }
+
+    #[test]
+    fn an_unknown_key_names_its_place_and_the_nearest_known_one() {
+        let document = document("[detector]\ndistance_mm = 300\ndistence_mm = 3\n");
+        let root = document.root();
+        let detector = root.required_table("detector").unwrap();
+        assert_eq!(detector.required_number("distance_mm", Bounds::POSITIVE), Ok(300.0));
+        let problem = detector.finish().unwrap_err();
+        assert_eq!(problem.line_and_column(), Some((3, 1)));
+        assert_eq!(problem.key(), "detector.distence_mm");
+        let text = problem.to_string();
+        assert!(text.contains("did you mean `distance_mm`?"), "{text}");
+        assert!(text.contains("rig.toml:3:1"), "{text}");
+    }
+
+    #[test]
+    fn nan_infinity_and_wrong_kinds_are_refused_with_what_was_found() {
+        for text in ["v = nan", "v = inf", "v = \"3\"", "v = -1.0", "v = [1]"] {
+            let document = document(text);
+            let problem = document.root().required_number("v", Bounds::POSITIVE).unwrap_err();
+            assert!(problem.to_string().contains("above 0"), "{problem}");
+        }
+        assert_eq!(document("v = 1_000").root().required_number("v", Bounds::POSITIVE), Ok(1000.0));
+    }
+
+    #[test]
+    fn a_missing_key_is_reported_at_its_table() {
+        let document = document("a = 1\n[link]\nkind = \"serial\"\n");
+        let link = document.root().required_table("link").unwrap();
+        let problem = link.required_integer("baud", 1..=10).unwrap_err();
+        assert_eq!(problem.line_and_column().unwrap().0, 2);
+        assert_eq!(problem.what(), "missing key");
+    }
+
+    #[test]
+    fn intervals_are_in_order() {
+        let document = document("travel_deg = [90, -90]");
+        let problem = document.root().required_interval("travel_deg", Bounds::FINITE).unwrap_err();
+        assert!(problem.to_string().contains("90 is not below -90"), "{problem}");
+    }
+
+    #[test]
+    fn syntax_errors_have_a_place() {
+        let problem = Document::parse(Source::new("plan.toml", "a = 1\nb = = 2\n")).unwrap_err();
+        assert_eq!(problem.line_and_column().unwrap().0, 2);
+    }
+}

@@ -1,0 +1,2 @@
+//! gonio
+fn main() {}
