@@ -1,2 +1,7 @@
-//! gonio
-fn main() {}
+//! The `gonio` program. All of it is in the library's `cli` room.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    gonio::cli::main()
+}
