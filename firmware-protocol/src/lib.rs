@@ -7,10 +7,12 @@
 #![no_std]
 
 mod board;
+mod device_core;
 mod message;
 mod time;
 
 pub use board::{Board, BoardFault, Illumination};
+pub use device_core::{LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD};
 pub use message::{
     AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult,
     Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
