@@ -1,1 +1,20 @@
-//! radiometry
+//! Light on rays: quantities with units, directions, throughput, solid angle, bases, quadrature.
+//!
+//! Pure mathematics, SI and radians. It reads no clock and no file, logs nothing, rolls no dice and
+//! knows neither rig nor plan. Transcendental functions come from `libm`, and everything else is
+//! correctly rounded by IEEE 754, so that an answer has the same bits on every machine.
+//!
+//! Frame, everywhere: a surface lies in z = 0 with its outward normal +z; θ is counted from +z, φ
+//! from +x towards +y.
+
+pub mod basis;
+pub mod direction;
+pub mod quadrature;
+pub mod quantity;
+pub mod solid_angle;
+pub mod throughput;
+
+mod domain;
+mod error_free;
+
+pub use domain::DomainError;
