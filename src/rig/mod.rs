@@ -4,8 +4,48 @@
 //! This room reads no clock, does no I/O but for the text of rig.toml, and does not know whether
 //! hardware exists.
 
+mod axis;
+mod detector;
+mod file;
+mod kinematics;
+mod link;
+mod motion;
 mod pose;
 mod reading;
 
+pub use axis::{Approach, Axis, LimitError, Readback};
+pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
+pub use kinematics::{Route, forward, solutions, wrap};
+pub use link::Link;
+pub use motion::rest_to_rest_s;
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
 pub use reading::{Latched, Reading, ReadingKind};
+
+use spanned_toml::Document;
+
+/// A rig as its file describes it.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    /// Its name.
+    pub name: String,
+    /// Its axes, in the order of [`AXES`].
+    pub axes: [Axis; 4],
+    /// Its detector.
+    pub detector: Detector,
+    /// How it is reached.
+    pub link: Link,
+    document: Document,
+}
+
+impl Rig {
+    /// The file that it was read from. Its table `[simulated]` is left unread here, for whoever
+    /// simulates the rig.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// Whether it is a simulated rig: then so is everything that it measures.
+    pub fn is_simulated(&self) -> bool {
+        matches!(self.link, Link::Simulated { .. })
+    }
+}

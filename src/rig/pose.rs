@@ -44,4 +44,23 @@ impl AxisName {
             Self::Y => "y",
         }
     }
+
+    /// Whether its positions are angles, in radians; else they are lengths, in metres.
+    pub const fn is_rotary(self) -> bool {
+        matches!(self, Self::Theta | Self::Phi)
+    }
+
+    /// The unit in the keys of files and in messages: `deg` or `mm`.
+    pub const fn file_unit(self) -> &'static str {
+        if self.is_rotary() { "deg" } else { "mm" }
+    }
+
+    /// A position with its unit, as messages print it: `97.500°`, `-12.000 mm`.
+    pub fn in_file_unit(self, position: f64) -> String {
+        if self.is_rotary() {
+            format!("{:.3}°", position.to_degrees())
+        } else {
+            format!("{:.3} mm", position * 1e3)
+        }
+    }
 }

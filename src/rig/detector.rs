@@ -1,0 +1,239 @@
+//! The spot detector: which quantity it yields, through which beam, with which ranges.
+//!
+//! It does not know what is looked at: the sample's radiance comes in as an argument.
+
+use std::f64::consts::PI;
+use std::time::Duration;
+
+/// Elementary charge, coulomb (exact, SI 2019).
+const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
+/// Above this standard deviation of one ADC reading, in least significant bits, quantisation
+/// errors of successive readings are as good as independent (Widrow and Kollár 2008, ch. 9: the
+/// residual dependence is below 2 %).
+const DITHER_LSB_MIN: f64 = 0.5;
+
+/// What the detector's calibration makes of its current.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// cd/m²: a photometric detector, its responsivity in A/lm.
+    Luminance,
+    /// W/(m² sr): a radiometric detector, its responsivity in A/W.
+    Radiance,
+    /// No unit: current through throughput, in A/(m² sr).
+    Relative,
+}
+
+/// A gain range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gain {
+    /// As plans name it.
+    pub name: String,
+    /// The current at which the ADC is full, ampere.
+    pub full_scale_a: f64,
+    /// Relative standard uncertainty of that current; the same for all readings in this range.
+    pub u_relative: f64,
+}
+
+/// The analog-to-digital converter: signed, full scale at 2^(bits - 1) counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Adc {
+    /// Resolution, sign included.
+    pub bits: u8,
+    /// Readings a second, each integrating from the one before it.
+    pub rate_hz: u32,
+}
+
+/// The spot detector.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detector {
+    /// What it yields.
+    pub quantity: Quantity,
+    /// From the sample's plane to the entrance pupil, metres.
+    pub distance_m: f64,
+    /// Standard uncertainty of the distance, metres.
+    pub u_distance_m: f64,
+    /// Radius of the entrance pupil, metres.
+    pub pupil_radius_m: f64,
+    /// Its standard uncertainty, metres.
+    pub u_pupil_radius_m: f64,
+    /// Radius of the spot that it sees on a sample facing it, metres.
+    pub spot_radius_m: f64,
+    /// Its standard uncertainty, metres.
+    pub u_spot_radius_m: f64,
+    /// A/W, or A/lm for luminance; 1 for a relative detector.
+    pub responsivity: f64,
+    /// Its relative standard uncertainty.
+    pub u_responsivity_relative: f64,
+    /// Standard deviation of one ADC reading without light, referred to the input, ampere.
+    pub read_noise_a: f64,
+    /// The gain ranges, in the order in which the device numbers them; never empty.
+    pub gains: Vec<Gain>,
+    /// The converter.
+    pub adc: Adc,
+}
+
+/// The variance of a dwell's mean as a straight line in the radiance that it saw, in squares of
+/// the detector's radiance unit: `floor + per_radiance * max(radiance, 0)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelledVariance {
+    /// Without light: read noise, quantisation, and the dark current's shot noise.
+    pub floor: f64,
+    /// More for each unit of radiance: its shot noise.
+    pub per_radiance: f64,
+}
+
+impl Quantity {
+    /// The column of the quantity in samples.csv; its uncertainty's column begins with `u_`.
+    pub const fn radiance_column(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminance_cd_per_m2",
+            Self::Radiance => "radiance_w_per_m2_sr",
+            Self::Relative => "radiance_relative",
+        }
+    }
+
+    /// The key of the exitance in fit.json.
+    pub const fn exitance_key(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminous_exitance_lm_per_m2",
+            Self::Radiance => "exitance_w_per_m2",
+            Self::Relative => "exitance_relative",
+        }
+    }
+
+    /// The key in fit.json of the exitance into the region's directions alone.
+    pub const fn exitance_within_region_key(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminous_exitance_within_region_lm_per_m2",
+            Self::Radiance => "exitance_within_region_w_per_m2",
+            Self::Relative => "exitance_within_region_relative",
+        }
+    }
+
+    /// The key of the flux in fit.json.
+    pub const fn flux_key(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminous_flux_lm",
+            Self::Radiance => "flux_w",
+            Self::Relative => "flux_relative",
+        }
+    }
+
+    /// The key of the highest radiance in fit.json.
+    pub const fn peak_key(self) -> &'static str {
+        match self {
+            Self::Luminance => "peak_luminance",
+            Self::Radiance => "peak_radiance",
+            Self::Relative => "peak_radiance_relative",
+        }
+    }
+
+    /// The unit of radiance, exitance and flux as people read them; empty for a relative one.
+    pub const fn units(self) -> [&'static str; 3] {
+        match self {
+            Self::Luminance => ["cd/m²", "lm/m²", "lm"],
+            Self::Radiance => ["W/(m² sr)", "W/m²", "W"],
+            Self::Relative => ["", "", ""],
+        }
+    }
+
+    /// The word in rig.toml.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminance",
+            Self::Radiance => "radiance",
+            Self::Relative => "relative",
+        }
+    }
+}
+
+impl Adc {
+    /// Counts at full scale: 2^(bits - 1).
+    pub fn full_scale_counts(self) -> f64 {
+        libm::ldexp(1.0, i32::from(self.bits) - 1)
+    }
+
+    /// ADC readings that fit into a dwell; at least one.
+    pub fn readings_in(self, dwell: Duration) -> u32 {
+        let whole = dwell.as_micros() * u128::from(self.rate_hz) / 1_000_000;
+        u32::try_from(whole).unwrap_or(u32::MAX).max(1)
+    }
+}
+
+impl Detector {
+    /// The place of a gain range in [`Detector::gains`], by its name.
+    pub fn gain_index(&self, name: &str) -> Option<u8> {
+        self.gains.iter().position(|gain| gain.name == name).and_then(|i| u8::try_from(i).ok())
+    }
+
+    /// The throughput T of its beam, m² sr: that of two coaxial disks, spot and pupil, exactly.
+    pub fn throughput_m2_sr(&self) -> f64 {
+        let (a, b) = (self.spot_radius_m, self.pupil_radius_m);
+        let (sum, root) = self.disk_terms();
+        2.0 * PI * PI * a * a * b * b / (sum + root)
+    }
+
+    /// The relative standard uncertainty of the throughput, from those of spot, pupil and
+    /// distance by the closed form's partial derivatives. The same for all readings of a rig.
+    pub fn u_throughput_relative(&self) -> f64 {
+        let (a, b, d) = (self.spot_radius_m, self.pupil_radius_m, self.distance_m);
+        let (sum, root) = self.disk_terms();
+        let by_spot = (sum + root - 2.0 * a * a) / (a * root);
+        let by_pupil = (sum + root - 2.0 * b * b) / (b * root);
+        let by_distance = -2.0 * d / root;
+        let terms = [
+            by_spot * self.u_spot_radius_m,
+            by_pupil * self.u_pupil_radius_m,
+            by_distance * self.u_distance_m,
+        ];
+        libm::sqrt(terms.iter().map(|term| term * term).sum())
+    }
+
+    /// With S = a² + b² + d², a and b the disks' radii and d their distance: S, and
+    /// Q = sqrt(S² - 4 a² b²). T = π²/2 (S - Q) = 2 π² a² b² / (S + Q).
+    fn disk_terms(&self) -> (f64, f64) {
+        let (a, b, d) = (self.spot_radius_m, self.pupil_radius_m, self.distance_m);
+        (a * a + b * b + d * d, libm::hypot(d, a + b) * libm::hypot(d, a - b))
+    }
+
+    /// One count in ampere.
+    pub fn lsb_a(&self, gain: u8) -> f64 {
+        self.full_scale_a(gain) / self.adc.full_scale_counts()
+    }
+
+    /// Ampere for one unit of radiance: responsivity times throughput.
+    pub fn a_per_radiance(&self) -> f64 {
+        self.responsivity * self.throughput_m2_sr()
+    }
+
+    /// The radiance at which the range is full, the dark current aside.
+    pub fn saturation_radiance(&self, gain: u8) -> f64 {
+        self.full_scale_a(gain) / self.a_per_radiance()
+    }
+
+    /// The variance to expect of the mean of `n` ADC readings, never looked up in the readings
+    /// themselves (a weight that follows its own reading's noise biases a fit).
+    ///
+    /// In ampere squared, at the current I: q I rate / n (shot noise, each reading integrating
+    /// over 1 / rate) + read noise² / n + lsb² / 12, the last divided by n only where read noise
+    /// dithers it.
+    pub fn modelled_variance(&self, gain: u8, n: u32, dark_a: f64) -> ModelledVariance {
+        let n = f64::from(n.max(1));
+        let shot_a2_per_a = ELEMENTARY_CHARGE_C * f64::from(self.adc.rate_hz) / n;
+        let lsb_a = self.lsb_a(gain);
+        let is_dithered = self.read_noise_a > DITHER_LSB_MIN * lsb_a;
+        let quantisation_a2 = lsb_a * lsb_a / 12.0 / if is_dithered { n } else { 1.0 };
+        let read_a2 = self.read_noise_a * self.read_noise_a / n;
+        let floor_a2 = read_a2 + quantisation_a2 + shot_a2_per_a * dark_a.max(0.0);
+        let a_per_radiance = self.a_per_radiance();
+        ModelledVariance {
+            floor: floor_a2 / (a_per_radiance * a_per_radiance),
+            per_radiance: shot_a2_per_a / a_per_radiance,
+        }
+    }
+
+    /// Full scale of a range, ampere; NaN for one that does not exist.
+    fn full_scale_a(&self, gain: u8) -> f64 {
+        self.gains.get(usize::from(gain)).map_or(f64::NAN, |gain| gain.full_scale_a)
+    }
+}

@@ -1,0 +1,277 @@
+//! rig.toml, read: every key of it but those of `[simulated]`, which is for whoever simulates
+//! the rig, and every limit checked.
+//!
+//! Lengths are millimetres and angles degrees in the file; metres and radians from here on.
+
+use std::collections::HashSet;
+use std::time::Duration;
+
+use spanned_toml::{Bounds, Document, Problem, Source, Table};
+
+use super::axis::{Approach, Axis, Readback};
+use super::detector::{Adc, Detector, Gain, Quantity};
+use super::{AXES, AxisName, Link, Rig};
+
+/// The rig behind `rig = "simulated"`.
+const BUILT_IN: &str = include_str!("simulated.toml");
+
+/// Channels are as many as there are axes, so that a move names them all.
+const CHANNEL_MAX: i64 = 3;
+const TRAVEL_MM_MAX: f64 = 10_000.0;
+const SETTLE_MS_MAX: f64 = 60_000.0;
+/// Gain ranges that a device can number.
+const GAINS_MAX: usize = 64;
+const RATE_HZ_MAX: i64 = 10_000_000;
+/// A relative standard uncertainty of 1 means that nothing is known.
+const RELATIVE: Bounds = Bounds::between(0.0, 1.0);
+/// Run-up of a one-sided axis, in the file's unit, where the file does not say.
+const RUN_UP_DEFAULT: f64 = 0.5;
+
+impl Rig {
+    /// Reads a rig file.
+    pub fn read(document: Document) -> Result<Self, Problem> {
+        let root = document.root();
+        let name = root.required_text("name")?.to_owned();
+        let axes = read_axes(&root.required_table("axes")?)?;
+        let detector = read_detector(root.required_table("detector")?)?;
+        let link = Link::read(root.required_table("link")?)?;
+        let is_simulated = matches!(link, Link::Simulated { .. });
+        if is_simulated {
+            root.leave("simulated");
+        } else if root.has("simulated") {
+            return Err(root.problem(
+                "simulated",
+                "a table for simulated rigs in the file of a real one",
+                "no such table where link.kind is \"serial\"",
+                "remove it, or set link.kind to \"simulated\"",
+            ));
+        }
+        root.finish()?;
+        Ok(Self { name, axes, detector, link, document })
+    }
+
+    /// The built-in simulated rig, which `rig = "simulated"` names.
+    pub fn built_in() -> Result<Self, Problem> {
+        Self::read(Document::parse(Source::new("the built-in rig", BUILT_IN))?)
+    }
+}
+
+fn read_axes(table: &Table<'_>) -> Result<[Axis; 4], Problem> {
+    let mut channels = HashSet::new();
+    let mut read = |name: AxisName| {
+        let axis_table = table.required_table(name.name())?;
+        let axis = read_axis(name, &axis_table)?;
+        if !channels.insert(axis.channel) {
+            return Err(axis_table.problem(
+                "channel",
+                &format!("channel {} is another axis's already", axis.channel),
+                "a channel of its own for each axis, from 0 to 3",
+                "give each axis the channel that it is wired to",
+            ));
+        }
+        axis_table.finish()?;
+        Ok(axis)
+    };
+    let [theta, phi, x, y] = AXES;
+    Ok([read(theta)?, read(phi)?, read(x)?, read(y)?])
+}
+
+/// An axis's keys. `UNIT` is `deg` for theta and phi, `mm` for x and y.
+///
+/// `channel` 0 to 3 · `travel_UNIT = [low, high]`, both allowed, around the home mark at 0 ·
+/// `speed_UNIT_per_s` · `acceleration_UNIT_per_s2` · `counts_per_UNIT` · `settle_ms`: rest before
+/// it is still · `approach` positive, negative or either (default): the side from which targets
+/// are reached, against backlash · `run_up_UNIT` (default 0.5): how far it goes past a target to
+/// come back to it from that side · `readback` encoder, steps or none · `u_zero_UNIT`: of where 0
+/// lies · `u_homing_UNIT`: of finding it again · `u_readback_UNIT`: of one position.
+fn read_axis(name: AxisName, table: &Table<'_>) -> Result<Axis, Problem> {
+    let unit = name.file_unit();
+    let si = |value: f64| if name.is_rotary() { value.to_radians() } else { value / 1e3 };
+    let positive = |key: &str| table.required_number(key, Bounds::POSITIVE);
+    let uncertainty = |key: String| table.required_number(&key, Bounds::NON_NEGATIVE).map(si);
+
+    let channel = table.required_integer("channel", 0..=CHANNEL_MAX)?;
+    let travel = read_travel(name, table)?;
+    let speed = positive(&format!("speed_{unit}_per_s"))?;
+    let acceleration = positive(&format!("acceleration_{unit}_per_s2"))?;
+    let counts_key = format!("counts_per_{unit}");
+    let counts = positive(&counts_key)?;
+    check_counts(table, &counts_key, counts, [travel.0, travel.1, speed, acceleration])?;
+    let settle_ms = table.required_number("settle_ms", Bounds::between(0.0, SETTLE_MS_MAX))?;
+    let (approach, run_up) = read_approach(table, &format!("run_up_{unit}"))?;
+    let readback = table.required_choice(
+        "readback",
+        &[("encoder", Readback::Encoder), ("steps", Readback::Steps), ("none", Readback::None)],
+    )?;
+    Ok(Axis {
+        name,
+        channel: u8::try_from(channel).unwrap_or_default(),
+        travel: (si(travel.0), si(travel.1)),
+        speed: si(speed),
+        acceleration: si(acceleration),
+        counts_per_unit: counts / si(1.0),
+        settle: Duration::from_secs_f64(settle_ms / 1e3),
+        approach,
+        run_up: si(run_up),
+        readback,
+        u_zero: uncertainty(format!("u_zero_{unit}"))?,
+        u_homing: uncertainty(format!("u_homing_{unit}"))?,
+        u_readback: uncertainty(format!("u_readback_{unit}"))?,
+    })
+}
+
+fn read_travel(name: AxisName, table: &Table<'_>) -> Result<(f64, f64), Problem> {
+    let key = format!("travel_{}", name.file_unit());
+    let reach = match name {
+        AxisName::Theta => 180.0,
+        AxisName::Phi => 540.0,
+        AxisName::X | AxisName::Y => TRAVEL_MM_MAX,
+    };
+    let travel = table.required_interval(&key, Bounds::between(-reach, reach))?;
+    if travel.0 <= 0.0 && travel.1 >= 0.0 {
+        return Ok(travel);
+    }
+    Err(table.problem(
+        &key,
+        &format!("0 lies outside {} to {}", travel.0, travel.1),
+        "a travel around 0, where the home mark is",
+        "count positions from the home mark",
+    ))
+}
+
+/// Everything that goes over the wire in counts must fit it: positions as i32, speed and
+/// acceleration as whole counts from 1.
+fn check_counts(
+    table: &Table<'_>,
+    key: &str,
+    counts_per_unit: f64,
+    [low, high, speed, acceleration]: [f64; 4],
+) -> Result<(), Problem> {
+    let most = counts_per_unit * low.abs().max(high.abs()).max(speed).max(acceleration);
+    let least = counts_per_unit * speed.min(acceleration);
+    if most > f64::from(i32::MAX) {
+        return Err(table.problem(
+            key,
+            &format!("travel, speed or acceleration makes {most:.0} counts"),
+            &format!("at most {} counts", i32::MAX),
+            "lower the counts, or check the unit of the travel",
+        ));
+    }
+    if least < 1.0 {
+        return Err(table.problem(
+            key,
+            &format!("speed or acceleration makes {least} counts a second"),
+            "at least one count a second, and one a second squared",
+            "check speed, acceleration and counts",
+        ));
+    }
+    Ok(())
+}
+
+fn read_approach(table: &Table<'_>, run_up_key: &str) -> Result<(Approach, f64), Problem> {
+    let words = [
+        ("positive", Approach::Positive),
+        ("negative", Approach::Negative),
+        ("either", Approach::Either),
+    ];
+    let approach = table.choice("approach", &words)?.unwrap_or(Approach::Either);
+    let run_up = table.number(run_up_key, Bounds::POSITIVE)?;
+    match (approach, run_up) {
+        (Approach::Either, Some(_)) => Err(table.problem(
+            run_up_key,
+            "a run-up on an axis that comes from either side",
+            "no run-up, or approach = \"positive\" or \"negative\"",
+            "say from which side the axis shall come, or remove the run-up",
+        )),
+        (Approach::Either, None) => Ok((approach, 0.0)),
+        (_, run_up) => Ok((approach, run_up.unwrap_or(RUN_UP_DEFAULT))),
+    }
+}
+
+/// The keys of `[detector]`.
+///
+/// `quantity` radiance (default), luminance or relative · `distance_mm` from the sample to the
+/// entrance pupil · `pupil_diameter_mm` · `spot_diameter_mm` on a sample facing it · a
+/// `u_..._mm` for each of the three · `responsivity_a_per_w` (for luminance
+/// `responsivity_a_per_lm`, for relative none) and `u_responsivity_relative` · `read_noise_a` of
+/// one ADC reading · `[[detector.gain]]` with `name`, `full_scale_a`, `u_relative` ·
+/// `[detector.adc]` with `bits` (sign included) and `rate_hz`.
+fn read_detector(table: Table<'_>) -> Result<Detector, Problem> {
+    let quantity = read_quantity(&table)?;
+    let length = |key: &str| table.required_number(key, Bounds::POSITIVE).map(|mm| mm / 1e3);
+    let u_length = |key: &str| table.required_number(key, Bounds::NON_NEGATIVE).map(|mm| mm / 1e3);
+    let (responsivity, u_responsivity_relative) = read_responsivity(&table, quantity)?;
+    let detector = Detector {
+        quantity,
+        distance_m: length("distance_mm")?,
+        u_distance_m: u_length("u_distance_mm")?,
+        pupil_radius_m: length("pupil_diameter_mm")? / 2.0,
+        u_pupil_radius_m: u_length("u_pupil_diameter_mm")? / 2.0,
+        spot_radius_m: length("spot_diameter_mm")? / 2.0,
+        u_spot_radius_m: u_length("u_spot_diameter_mm")? / 2.0,
+        responsivity,
+        u_responsivity_relative,
+        read_noise_a: table.required_number("read_noise_a", Bounds::NON_NEGATIVE)?,
+        gains: read_gains(&table)?,
+        adc: read_adc(table.required_table("adc")?)?,
+    };
+    table.finish()?;
+    Ok(detector)
+}
+
+fn read_quantity(table: &Table<'_>) -> Result<Quantity, Problem> {
+    let words = [Quantity::Radiance, Quantity::Luminance, Quantity::Relative]
+        .map(|quantity| (quantity.name(), quantity));
+    Ok(table.choice("quantity", &words)?.unwrap_or(Quantity::Radiance))
+}
+
+fn read_responsivity(table: &Table<'_>, quantity: Quantity) -> Result<(f64, f64), Problem> {
+    let key = match quantity {
+        Quantity::Luminance => "responsivity_a_per_lm",
+        Quantity::Radiance => "responsivity_a_per_w",
+        Quantity::Relative => return Ok((1.0, 0.0)),
+    };
+    let responsivity = table.required_number(key, Bounds::POSITIVE)?;
+    let u_relative = table.required_number("u_responsivity_relative", RELATIVE)?;
+    Ok((responsivity, u_relative))
+}
+
+fn read_gains(table: &Table<'_>) -> Result<Vec<Gain>, Problem> {
+    let mut gains: Vec<Gain> = Vec::new();
+    for gain_table in table.tables("gain")? {
+        let gain = Gain {
+            name: gain_table.required_text("name")?.to_owned(),
+            full_scale_a: gain_table.required_number("full_scale_a", Bounds::POSITIVE)?,
+            u_relative: gain_table.required_number("u_relative", RELATIVE)?,
+        };
+        if gains.iter().any(|known| known.name == gain.name) {
+            return Err(gain_table.problem(
+                "name",
+                &format!("\"{}\" is the name of another gain range already", gain.name),
+                "a name of its own for each gain range",
+                "rename one of the two",
+            ));
+        }
+        gain_table.finish()?;
+        gains.push(gain);
+    }
+    if (1..=GAINS_MAX).contains(&gains.len()) {
+        return Ok(gains);
+    }
+    Err(table.problem(
+        "gain",
+        &format!("{} gain ranges", gains.len()),
+        &format!("1 to {GAINS_MAX} gain ranges"),
+        "add [[detector.gain]] with name, full_scale_a and u_relative",
+    ))
+}
+
+fn read_adc(table: Table<'_>) -> Result<Adc, Problem> {
+    let bits = table.required_integer("bits", 8..=32)?;
+    let rate_hz = table.required_integer("rate_hz", 1..=RATE_HZ_MAX)?;
+    table.finish()?;
+    Ok(Adc {
+        bits: u8::try_from(bits).unwrap_or_default(),
+        rate_hz: u32::try_from(rate_hz).unwrap_or_default(),
+    })
+}
