@@ -1,0 +1,294 @@
+//! plan.toml, read: every key of it, with its bounds.
+//!
+//! Lengths are millimetres and angles degrees in the file; metres and radians from here on.
+//! Whether the rig can do it is asked later, when the sequence is laid out.
+
+use std::time::Duration;
+
+use spanned_toml::{Bounds, Document, Problem, Table};
+
+use super::{
+    Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, WarmUp,
+};
+use crate::rig::{Pose, wrap};
+
+/// A sample is smaller than this from its origin.
+const PLACE_MM: Bounds = Bounds::between(-10_000.0, 10_000.0);
+const THETA_DEG: Bounds = Bounds::between(0.0, 90.0);
+/// An azimuth may be written in any turn that a person would write.
+const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
+const STEP_DEG: Bounds = Bounds::between(0.001, 360.0);
+/// The wire's dwell is a 32-bit count of microseconds; an hour is well inside.
+const DWELL_MS: Bounds = Bounds::between(0.01, 3_600_000.0);
+const SECONDS: Bounds = Bounds::positive_up_to(1e7);
+/// Relative tolerances, not percentages.
+const RELATIVE: Bounds = Bounds::positive_up_to(1.0);
+/// Steps that miss a whole turn by less than this much of it go round.
+const WHOLE_SLACK: f64 = 1e-9;
+const NAME_BYTES_MAX: usize = 100;
+const COUNT_MAX: i64 = TARGETS_MAX as i64;
+const REPEAT_MAX: i64 = 1_000;
+const ANGULAR_DEGREE_MAX: i64 = 60;
+const POSITION_DEGREE_MAX: i64 = 12;
+/// Targets between dark readings, and between reference readings, where the plan does not say.
+const DARK_EVERY: u32 = 200;
+const REFERENCE_EVERY: u32 = 100;
+/// A dark and a reference reading integrate this many times as long as a target, where the plan
+/// does not say: their noise enters many targets.
+const DARK_DWELLS: u32 = 4;
+const REFERENCE_DWELLS: u32 = 2;
+
+impl Plan {
+    /// Reads a plan file.
+    ///
+    /// At the top: `name`, what to call its runs · `rig`, a rig file beside the plan or
+    /// `"simulated"` · `scene`, a scene file beside the plan. Then the tables `[region]`,
+    /// `[schedule]`, `[dwell]`, `[dark]`, `[fit]`, and if wanted `[reference]`, `[warm_up]` and
+    /// `[stop]`.
+    pub fn read(document: Document) -> Result<Self, Problem> {
+        let root = document.root();
+        let text = |key: &str| root.text(key).map(|text| text.map(str::to_owned));
+        let (name, rig, scene) = (read_name(&root)?, text("rig")?, text("scene")?);
+        let region = read_region(root.required_table("region")?)?;
+        let (schedule, order, repeat) = read_schedule(root.required_table("schedule")?)?;
+        let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
+        let dark = read_dark(root.required_table("dark")?, dwell)?;
+        let reference = read_reference(root.table("reference")?, &region, dwell)?;
+        let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
+        let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
+        let fit = read_fit(root.required_table("fit")?)?;
+        root.finish()?;
+        Ok(Self {
+            name,
+            rig,
+            scene,
+            region,
+            schedule,
+            order,
+            repeat,
+            dwell,
+            gain,
+            dark,
+            reference,
+            warm_up,
+            stop,
+            fit,
+            document,
+        })
+    }
+}
+
+/// A run's folder is named after the plan, so the name is one that a folder can have.
+fn read_name(root: &Table<'_>) -> Result<Option<String>, Problem> {
+    let Some(name) = root.text("name")? else { return Ok(None) };
+    let is_plain = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+    if name.chars().all(is_plain) && !name.starts_with('.') && name.len() <= NAME_BYTES_MAX {
+        return Ok(Some(name.to_owned()));
+    }
+    Err(root.problem(
+        "name",
+        &format!("\"{name}\" can't name a folder"),
+        &format!(
+            "at most {NAME_BYTES_MAX} letters, digits, spaces, '-', '_' and '.', no '.' first"
+        ),
+        "runs are kept in folders named after the plan",
+    ))
+}
+
+/// `[region]`: `x_mm`, `y_mm` = [low, high] on the sample; `theta_max_deg` from the normal, at
+/// most 90. All azimuths belong to it.
+fn read_region(table: Table<'_>) -> Result<Region, Problem> {
+    let interval = |key: &str| {
+        let (low, high) = table.required_interval(key, PLACE_MM)?;
+        Ok((low / 1e3, high / 1e3))
+    };
+    let region = Region {
+        x_m: interval("x_mm")?,
+        y_m: interval("y_mm")?,
+        theta_max_rad: table
+            .required_number("theta_max_deg", Bounds::positive_up_to(90.0))?
+            .to_radians(),
+    };
+    table.finish()?;
+    Ok(region)
+}
+
+/// `[schedule]`: `kind`, and after it
+/// raster: `x_count`, `y_count`, `theta_step_deg`, `phi_step_deg` ·
+/// cgamma: `x_count`, `y_count`, `c_step_deg`, `gamma_step_deg` ·
+/// low-discrepancy: `count` · list: `file`.
+/// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
+fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32), Problem> {
+    #[derive(Clone, Copy)]
+    enum Kind {
+        CGamma,
+        List,
+        LowDiscrepancy,
+        Raster,
+    }
+    let words = [
+        ("raster", Kind::Raster),
+        ("cgamma", Kind::CGamma),
+        ("low-discrepancy", Kind::LowDiscrepancy),
+        ("list", Kind::List),
+    ];
+    let count = |key: &str| read_count(&table, key, COUNT_MAX);
+    let step = |key: &str| table.required_number(key, STEP_DEG);
+    let schedule = match table.required_choice("kind", &words)? {
+        Kind::Raster => Schedule::Raster {
+            x_count: count("x_count")?,
+            y_count: count("y_count")?,
+            theta_step_deg: step("theta_step_deg")?,
+            phi_step_deg: read_turn_step(&table, "phi_step_deg")?,
+        },
+        Kind::CGamma => Schedule::CGamma {
+            x_count: count("x_count")?,
+            y_count: count("y_count")?,
+            c_step_deg: read_turn_step(&table, "c_step_deg")?,
+            gamma_step_deg: step("gamma_step_deg")?,
+        },
+        Kind::LowDiscrepancy => Schedule::LowDiscrepancy { count: count("count")? },
+        Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
+    };
+    let orders = [("travel", Order::Travel), ("listed", Order::Listed)];
+    let order = table.choice("order", &orders)?.unwrap_or(Order::Travel);
+    let repeat = table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole);
+    table.finish()?;
+    Ok((schedule, order, repeat))
+}
+
+/// A step that goes round a whole number of times, so that the last gap equals the others.
+fn read_turn_step(table: &Table<'_>, key: &str) -> Result<f64, Problem> {
+    let step = table.required_number(key, STEP_DEG)?;
+    let steps = 360.0 / step;
+    if (steps - libm::round(steps)).abs() <= WHOLE_SLACK * steps {
+        return Ok(step);
+    }
+    let (fine, coarse) = (360.0 / libm::ceil(steps), 360.0 / libm::floor(steps));
+    Err(table.problem(
+        key,
+        &format!("360° is not a whole number of steps of {step}°"),
+        "a step that divides 360",
+        &format!("try {fine} or {coarse}"),
+    ))
+}
+
+/// `[dwell]`: `dwell_ms`; `gain`, a gain range's name (default: the rig's first).
+fn read_dwell(table: Table<'_>) -> Result<(Duration, Option<String>), Problem> {
+    let dwell = millis(table.required_number("dwell_ms", DWELL_MS)?);
+    let gain = table.text("gain")?.map(str::to_owned);
+    table.finish()?;
+    Ok((dwell, gain))
+}
+
+/// `[dark]`: `method` shutter or source-off (which asks a person); `every` so many targets
+/// (default 200); `dwell_ms` (default four times a target's).
+fn read_dark(table: Table<'_>, dwell: Duration) -> Result<Dark, Problem> {
+    let words = [("shutter", DarkMethod::Shutter), ("source-off", DarkMethod::SourceOff)];
+    let dark = Dark {
+        every: table.integer("every", 1..=COUNT_MAX)?.map_or(DARK_EVERY, whole),
+        dwell: table.number("dwell_ms", DWELL_MS)?.map_or(dwell * DARK_DWELLS, millis),
+        method: table.required_choice("method", &words)?,
+    };
+    table.finish()?;
+    Ok(dark)
+}
+
+/// `[reference]`: `x_mm`, `y_mm` (default: the region's middle), `theta_deg`, `phi_deg` (default
+/// 0); `every` so many targets (default 100); `dwell_ms` (default twice a target's).
+fn read_reference(
+    table: Option<Table<'_>>,
+    region: &Region,
+    dwell: Duration,
+) -> Result<Reference, Problem> {
+    let mut reference = Reference {
+        pose: Pose {
+            x_m: 0.5 * (region.x_m.0 + region.x_m.1),
+            y_m: 0.5 * (region.y_m.0 + region.y_m.1),
+            theta_rad: 0.0,
+            phi_rad: 0.0,
+        },
+        every: REFERENCE_EVERY,
+        dwell: dwell * REFERENCE_DWELLS,
+    };
+    let Some(table) = table else { return Ok(reference) };
+    let pose = &mut reference.pose;
+    if let Some(x_mm) = table.number("x_mm", PLACE_MM)? {
+        pose.x_m = x_mm / 1e3;
+    }
+    if let Some(y_mm) = table.number("y_mm", PLACE_MM)? {
+        pose.y_m = y_mm / 1e3;
+    }
+    pose.theta_rad = table.number("theta_deg", THETA_DEG)?.unwrap_or(0.0).to_radians();
+    pose.phi_rad = wrap(table.number("phi_deg", PHI_DEG)?.unwrap_or(0.0).to_radians());
+    if let Some(every) = table.integer("every", 1..=COUNT_MAX)? {
+        reference.every = whole(every);
+    }
+    if let Some(dwell_ms) = table.number("dwell_ms", DWELL_MS)? {
+        reference.dwell = millis(dwell_ms);
+    }
+    table.finish()?;
+    Ok(reference)
+}
+
+/// `[warm_up]`: reference readings until they stay within `tolerance_relative` (highest less
+/// lowest over their mean) for `over_s`; given up after `timeout_s`.
+fn read_warm_up(table: Table<'_>) -> Result<WarmUp, Problem> {
+    let seconds = |key: &str| table.required_number(key, SECONDS).map(Duration::from_secs_f64);
+    let warm_up = WarmUp {
+        tolerance_relative: table.required_number("tolerance_relative", RELATIVE)?,
+        over: seconds("over_s")?,
+        timeout: seconds("timeout_s")?,
+    };
+    if warm_up.timeout < warm_up.over {
+        return Err(table.problem(
+            "timeout_s",
+            "it ends before the readings can have been stable for over_s",
+            "a timeout_s of at least over_s",
+            "raise timeout_s, or lower over_s",
+        ));
+    }
+    table.finish()?;
+    Ok(warm_up)
+}
+
+/// `[stop]`: `exitance_relative`, once the exitance's relative standard uncertainty is that small;
+/// `rig_time_s_max`, once the rig has worked that long.
+fn read_stop(table: Table<'_>) -> Result<Stop, Problem> {
+    let stop = Stop {
+        exitance_relative: table.number("exitance_relative", RELATIVE)?,
+        rig_time_max: table.number("rig_time_s_max", SECONDS)?.map(Duration::from_secs_f64),
+    };
+    table.finish()?;
+    Ok(stop)
+}
+
+/// `[fit]`: `angular_degree` of the polynomials on the Nusselt disk; `position_degree` of those in
+/// x and y.
+fn read_fit(table: Table<'_>) -> Result<FitSpec, Problem> {
+    let degree = |key: &str, most: i64| {
+        let degree = table.required_integer(key, 0..=most)?;
+        Ok(usize::try_from(degree).unwrap_or_default())
+    };
+    let fit = FitSpec {
+        angular_degree: degree("angular_degree", ANGULAR_DEGREE_MAX)?,
+        position_degree: degree("position_degree", POSITION_DEGREE_MAX)?,
+    };
+    table.finish()?;
+    Ok(fit)
+}
+
+fn read_count(table: &Table<'_>, key: &str, most: i64) -> Result<u32, Problem> {
+    table.required_integer(key, 1..=most).map(whole)
+}
+
+/// An integer that its bounds keep inside u32.
+fn whole(integer: i64) -> u32 {
+    u32::try_from(integer).unwrap_or(u32::MAX)
+}
+
+/// To whole microseconds, as they go over the wire.
+fn millis(ms: f64) -> Duration {
+    let exact = Duration::from_secs_f64(ms / 1e3);
+    Duration::new(exact.as_secs(), (exact.subsec_nanos() + 500) / 1_000 * 1_000)
+}
