@@ -7,14 +7,26 @@
 #![no_std]
 
 mod board;
+mod bounds;
+mod codec;
+mod decoder;
 mod device_core;
+pub mod frame;
+mod host;
 mod message;
+mod packet;
 mod time;
 
 pub use board::{Board, BoardFault, Illumination};
+pub use codec::{CodecError, EventType, ReplyType, RequestType};
+pub use decoder::{BadFrames, Decoder};
 pub use device_core::{LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD};
+pub use host::{
+    HostEndpoint, HostEvent, LinkCause, LinkStatistics, Nonsense, SubmitError, Ticket, WINDOW,
+};
 pub use message::{
     AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult,
     Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
 };
+pub use packet::{Foreign, NakReason, PROTOCOL, PacketError, Said, SessionTag, ToDevice, ToHost};
 pub use time::{Instant, Tick, TickUnwrapper};
