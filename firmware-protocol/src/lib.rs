@@ -14,13 +14,16 @@ mod device_core;
 pub mod frame;
 mod host;
 mod message;
+mod motion;
 mod packet;
 mod time;
 
 pub use board::{Board, BoardFault, Illumination};
 pub use codec::{CodecError, EventType, ReplyType, RequestType};
 pub use decoder::{BadFrames, Decoder};
-pub use device_core::{LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD};
+pub use device_core::{
+    DeviceCore, LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD,
+};
 pub use host::{
     HostEndpoint, HostEvent, LinkCause, LinkStatistics, Nonsense, SubmitError, Ticket, WINDOW,
 };
@@ -28,5 +31,6 @@ pub use message::{
     AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult,
     Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
 };
+pub use motion::Trapezoid;
 pub use packet::{Foreign, NakReason, PROTOCOL, PacketError, Said, SessionTag, ToDevice, ToHost};
 pub use time::{Instant, Tick, TickUnwrapper};
