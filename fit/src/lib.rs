@@ -1,1 +1,62 @@
-//! fit
+//! Samples of radiance along rays to the field L(x, y, θ, φ) that they are samples of, with its
+//! uncertainty. Knows no rig, no counts, no file and no clock.
+//!
+//! The field is a sum of Zernike polynomials on the Nusselt disk (r = sin θ) times Legendre
+//! polynomials in the position over the region. Zernike polynomials are orthonormal under the
+//! projected solid angle cos θ dω, so that the radiant exitance is one coefficient: M = c₀ √π.
+//! The coefficients come from weighted least squares by a streamed orthogonal factorisation
+//! ([`triangle`]): memory grows with the coefficients, never with the readings.
+//!
+//! What is independent from reading to reading ([`Noise`]) makes the weights. What all readings
+//! share ([`Common`]: a responsivity, a dark level, an axis zero) makes none; it is carried through
+//! the fit with its correlations and kept apart in every result ([`Estimate::u_independent`]).
+//!
+//! A reading stands for the radiance along one ray: the beam's width is not averaged over. In
+//! directions that were not measured the polynomials extrapolate, and u grows as it must.
+//!
+//! ```
+//! use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
+//! use std::f64::consts::PI;
+//!
+//! // A Lambertian source of 100 W·m⁻²·sr⁻¹, seen in 24 directions.
+//! let ray = |i: u32| Ray {
+//!     x_m: 0.0,
+//!     y_m: 0.0,
+//!     theta_rad: f64::from(i % 8) * 0.2,
+//!     phi_rad: f64::from(i / 8) * 2.1,
+//! };
+//! let noise = Noise::Fixed { variance: 0.01 };
+//! let samples: Vec<Sample> =
+//!     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
+//! let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+//! let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+//! let responsivity = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
+//!
+//! let field = fit::fit(&samples, &region, basis, &[responsivity])?;
+//! let exitance = field.exitance();
+//! assert!((exitance.value - 100.0 * PI).abs() < 1e-11);
+//! assert!(exitance.u > 2.0 * PI && exitance.u_independent < 0.2); // 2 % of 100 π, and the noise
+//! assert!((field.flux().value - 100.0 * PI * 4e-4).abs() < 1e-15);
+//! # Ok::<(), fit::FitError>(())
+//! ```
+
+pub use basis::BasisSpec;
+pub use error::FitError;
+pub use fitted::{CommonShift, Contribution, Estimate, Fit, Parts, Quality};
+pub use peak::Peak;
+pub use sample::{Noise, Ray, Region, Sample};
+pub use shift::{Common, RayShift, Shift, ValueShift};
+pub use solve::fit;
+pub use undetermined::Cause;
+
+mod basis;
+mod check;
+mod error;
+mod fitted;
+mod peak;
+mod sample;
+mod shift;
+mod solve;
+pub mod triangle;
+mod undetermined;
+mod weights;

@@ -1,0 +1,152 @@
+//! Why a fit is refused, each with its own sentence. Indices count the samples from 0, as they
+//! were handed in.
+
+use crate::undetermined::Cause;
+use std::fmt;
+
+/// Why there is no fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FitError {
+    /// There is not one sample. Measure something, or look why everything was left out.
+    Empty,
+    /// The region's ends are not finite or out of order, or its cone exceeds the hemisphere.
+    Region,
+    /// The basis has more functions than a dense fit may hold. Ask for lower degrees.
+    TooLarge {
+        /// Coefficients of the basis asked for.
+        coefficients: usize,
+        /// Most that are taken.
+        coefficients_max: usize,
+    },
+    /// A number of a sample is NaN or infinite. Leave the sample out, or mend its source.
+    NotFinite {
+        /// The sample.
+        index: usize,
+        /// Which of its numbers.
+        what: &'static str,
+    },
+    /// A variance is zero or negative, which would be infinite weight.
+    Variance {
+        /// The sample.
+        index: usize,
+        /// Which of its numbers.
+        what: &'static str,
+        /// As handed in.
+        value: f64,
+    },
+    /// A direction below the sample's plane, which the surface chart doesn't have.
+    Theta {
+        /// The sample.
+        index: usize,
+        /// From the normal, radians.
+        theta_rad: f64,
+    },
+    /// A position off the region. Polynomials extrapolate badly: widen the region instead.
+    OutsideRegion {
+        /// The sample.
+        index: usize,
+        /// Where it lies, metres.
+        x_m: f64,
+        /// Where it lies, metres.
+        y_m: f64,
+    },
+    /// Fewer samples than coefficients. Measure more, or ask for lower degrees.
+    FewerReadingsThanCoefficients {
+        /// Samples handed in.
+        readings: usize,
+        /// Coefficients of the basis asked for.
+        coefficients: usize,
+    },
+    /// As many samples as coefficients, and no word on their noise: no residual is left to tell.
+    NoScatter {
+        /// Samples handed in, and coefficients.
+        readings: usize,
+    },
+    /// The samples leave combinations of coefficients open.
+    Undetermined {
+        /// How many combinations are determined.
+        rank: usize,
+        /// Coefficients of the basis asked for.
+        coefficients: usize,
+        /// What is missing, in words.
+        causes: Vec<Cause>,
+        /// The functions that are involved most, at most eight.
+        functions: Vec<String>,
+    },
+    /// A common component's u is negative or not finite, or its shift yields such a number.
+    Common {
+        /// The component.
+        name: String,
+    },
+    /// The numbers are so large or so small that squares leave the range of f64.
+    OutOfRange,
+    /// Stored parts of a fit don't belong together.
+    Parts {
+        /// Which part.
+        what: &'static str,
+        /// Numbers that the basis calls for.
+        expected: usize,
+        /// Numbers found (finite ones).
+        found: usize,
+    },
+}
+
+impl fmt::Display for FitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => f.write_str("no samples: there is nothing to fit"),
+            Self::Region => f.write_str(
+                "region: ends must be finite and in order, theta_max above 0° and at most 90°",
+            ),
+            Self::TooLarge { coefficients, coefficients_max } => {
+                write!(f, "{coefficients} coefficients are more than {coefficients_max}")
+            }
+            Self::NotFinite { index, what } => write!(f, "sample {index}: {what} is not finite"),
+            Self::Variance { index, what, value } => {
+                write!(f, "sample {index}: {what} {value:e}, expected more than 0")
+            }
+            Self::Theta { index, theta_rad } => {
+                let theta_deg = theta_rad.to_degrees();
+                write!(f, "sample {index}: theta {theta_deg:.3}° is outside 0° to 90°")
+            }
+            Self::OutsideRegion { index, x_m, y_m } => {
+                let (x_mm, y_mm) = (x_m * 1e3, y_m * 1e3);
+                write!(f, "sample {index}: ({x_mm:.3}, {y_mm:.3}) mm lies outside the region")
+            }
+            Self::FewerReadingsThanCoefficients { readings, coefficients } => {
+                write!(f, "{readings} readings are fewer than the {coefficients} coefficients")
+            }
+            Self::NoScatter { readings } => write!(
+                f,
+                "{readings} readings of unknown noise for as many coefficients: no residual tells \
+                 the noise"
+            ),
+            Self::Undetermined { rank, coefficients, causes, functions } => {
+                undetermined(f, *rank, *coefficients, causes, functions)
+            }
+            Self::Common { name } => {
+                write!(f, "common component `{name}`: u or its shift is negative or not finite")
+            }
+            Self::OutOfRange => f.write_str("values or variances leave the range of numbers"),
+            Self::Parts { what, expected, found } => {
+                write!(f, "stored fit: {what}: expected {expected} finite numbers, found {found}")
+            }
+        }
+    }
+}
+
+fn undetermined(
+    f: &mut fmt::Formatter<'_>,
+    rank: usize,
+    coefficients: usize,
+    causes: &[Cause],
+    functions: &[String],
+) -> fmt::Result {
+    write!(f, "{rank} of {coefficients} coefficients are determined")?;
+    for cause in causes {
+        write!(f, "; {cause}")?;
+    }
+    write!(f, "; most involved: {}", functions.join(", "))
+}
+
+impl std::error::Error for FitError {}

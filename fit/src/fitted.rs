@@ -1,0 +1,280 @@
+//! The fitted field and what follows from it. All derived quantities but the peak's place are linear
+//! in the coefficients, and all go through one door: a functional f has the value f·c, the
+//! independent variance |Sᵀf|² and the shift f·δ by each common component, whose squares add.
+
+use crate::basis::{Basis, dot};
+use crate::{BasisSpec, FitError, Ray, Region};
+use radiometry::DomainError;
+
+/// A value with its combined standard uncertainty (k = 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The best value.
+    pub value: f64,
+    /// The standard uncertainty by all components.
+    pub u: f64,
+    /// By what is independent from reading to reading alone: it falls as more is measured.
+    pub u_independent: f64,
+}
+
+/// A row of an uncertainty budget.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contribution {
+    /// `independent`, or the name of a common component.
+    pub name: String,
+    /// Its part of the standard uncertainty; the parts' squares add to the whole's.
+    pub u: f64,
+}
+
+/// The numbers that a fit consists of, to be stored and taken up again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// What the fit stands for.
+    pub region: Region,
+    /// Which functions.
+    pub basis: BasisSpec,
+    /// One a function, in the value's unit.
+    pub coefficients: Vec<f64>,
+    /// The upper triangular S of the independent covariance S Sᵀ, packed by columns: S₀₀, S₀₁, S₁₁,
+    /// S₀₂, ...
+    pub factor: Vec<f64>,
+    /// The coefficients' shift by one u of each common component.
+    pub shifts: Vec<CommonShift>,
+    /// How good the fit is.
+    pub quality: Quality,
+}
+
+/// The coefficients' shift by one standard uncertainty of a common component.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonShift {
+    /// The component.
+    pub name: String,
+    /// One number a coefficient.
+    pub shift: Vec<f64>,
+}
+
+/// What tells a good fit from a bad one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Condition number of the weighted design matrix, its columns scaled to equal length.
+    pub condition: f64,
+    /// Samples used.
+    pub n_used: usize,
+    /// Samples less coefficients.
+    pub dof: usize,
+    /// Root mean square of value - fitted, unweighted, in the value's unit.
+    pub residual_rms: f64,
+    /// Sum of squared residuals over the samples' stated variance; about `dof` where noise and
+    /// basis are right. Samples of unknown noise count with the excess.
+    pub chi2: f64,
+    /// Standard deviation of scatter beyond the stated noise, in the value's unit: what the basis
+    /// can't follow, pose jitter, drift. 0 unless chi2 exceeds its dof by 3 of its standard
+    /// deviations (or the noise was unknown). It is part of the weights and of every u, taken as
+    /// independent from reading to reading.
+    pub excess_rms: f64,
+}
+
+/// The fitted field L(x, y, θ, φ), with its covariance.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    basis: Basis,
+    parts: Parts,
+}
+
+impl Fit {
+    /// Takes up stored parts.
+    pub fn from_parts(parts: Parts) -> Result<Self, FitError> {
+        if !parts.region.is_sound() {
+            return Err(FitError::Region);
+        }
+        let p = parts.basis.checked_len()?;
+        demand("coefficients", p, &parts.coefficients)?;
+        demand("factor", p * (p + 1) / 2, &parts.factor)?;
+        for common in &parts.shifts {
+            demand("shift", p, &common.shift)?;
+        }
+        Ok(Self { basis: Basis::new(parts.basis, parts.region), parts })
+    }
+
+    /// The numbers that the fit consists of.
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// The radiance along a ray, in the unit of the samples' values. Outside the region and its
+    /// cone it is extrapolated, and u says how little is known there.
+    pub fn radiance(&self, ray: &Ray) -> Estimate {
+        self.estimate(&self.radiance_functional(ray))
+    }
+
+    /// The exitance M = ∫ L cos θ dω over the whole hemisphere, mean over the region, in the
+    /// values' unit times sr: c₀ √π. Beyond what was measured it is extrapolated.
+    pub fn exitance(&self) -> Estimate {
+        self.estimate(&self.basis.exitance())
+    }
+
+    /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
+    pub fn exitance_within(&self, theta_max_rad: f64) -> Result<Estimate, DomainError> {
+        Ok(self.estimate(&self.basis.exitance_within(theta_max_rad)?))
+    }
+
+    /// The flux that leaves the region: exitance times its area, in the values' unit times m² sr.
+    pub fn flux(&self) -> Estimate {
+        self.exitance().times(self.region().area_m2())
+    }
+
+    /// The intensity of the region as a whole in a direction: ∫ L cos θ dA, in the values' unit
+    /// times m².
+    pub fn intensity(&self, theta_rad: f64, phi_rad: f64) -> Estimate {
+        let mean = self.estimate(&self.basis.mean_over_region(theta_rad, phi_rad));
+        mean.times(self.region().area_m2() * libm::cos(theta_rad))
+    }
+
+    /// The exitance within the region's cone over that of the hemisphere: how much of the latter
+    /// rests on measurement. `None` where the exitance isn't positive.
+    pub fn measured_fraction(&self) -> Option<f64> {
+        let within = self.exitance_within(self.region().theta_max_rad).ok()?.value;
+        let whole = self.exitance().value;
+        (whole > 0.0).then(|| within / whole)
+    }
+
+    /// The exitance's uncertainty by source, the independent part first.
+    pub fn contributions(&self) -> Vec<Contribution> {
+        self.budget(&self.basis.exitance())
+    }
+
+    /// The uncertainty of the radiance along a ray by source, the independent part first.
+    pub fn radiance_contributions(&self, ray: &Ray) -> Vec<Contribution> {
+        self.budget(&self.radiance_functional(ray))
+    }
+
+    /// One a function, in the order of [`names`](Self::names).
+    pub fn coefficients(&self) -> &[f64] {
+        &self.parts.coefficients
+    }
+
+    /// The coefficients' covariance by all components, rows of a symmetric matrix.
+    pub fn covariance(&self) -> Vec<Vec<f64>> {
+        let p = self.basis.len();
+        let mut covariance = vec![vec![0.0; p]; p];
+        let shifts = self.parts.shifts.iter().map(|common| common.shift.as_slice());
+        for outer in self.factor_columns().chain(shifts) {
+            for (i, a) in outer.iter().enumerate() {
+                for (out, b) in covariance[i].iter_mut().zip(outer) {
+                    *out += a * b;
+                }
+            }
+        }
+        covariance
+    }
+
+    /// The functions: `Z(n,m)` on the Nusselt disk, times Legendre polynomials `P1(x)`, `P2(y)`.
+    pub fn names(&self) -> Vec<String> {
+        (0..self.basis.len()).map(|k| self.basis.name(k)).collect()
+    }
+
+    /// Which functions.
+    pub fn basis(&self) -> BasisSpec {
+        self.parts.basis
+    }
+
+    /// What the fit stands for.
+    pub fn region(&self) -> &Region {
+        &self.parts.region
+    }
+
+    /// See [`Quality::condition`].
+    pub fn condition(&self) -> f64 {
+        self.parts.quality.condition
+    }
+
+    /// See [`Quality::dof`].
+    pub fn dof(&self) -> usize {
+        self.parts.quality.dof
+    }
+
+    /// See [`Quality::n_used`].
+    pub fn n_used(&self) -> usize {
+        self.parts.quality.n_used
+    }
+
+    /// See [`Quality::residual_rms`].
+    pub fn residual_rms(&self) -> f64 {
+        self.parts.quality.residual_rms
+    }
+
+    /// See [`Quality::chi2`].
+    pub fn chi2(&self) -> f64 {
+        self.parts.quality.chi2
+    }
+
+    /// See [`Quality::excess_rms`].
+    pub fn excess_rms(&self) -> f64 {
+        self.parts.quality.excess_rms
+    }
+
+    pub(crate) fn functions(&self) -> &Basis {
+        &self.basis
+    }
+
+    fn radiance_functional(&self, ray: &Ray) -> Vec<f64> {
+        let mut functional = vec![0.0; self.basis.len()];
+        self.basis.row(ray, &mut self.basis.scratch(), &mut functional);
+        functional
+    }
+
+    /// The one door from coefficients to a number with its uncertainty.
+    fn estimate(&self, functional: &[f64]) -> Estimate {
+        let independent = self.independent_variance(functional);
+        let common = self.common_shifts(functional).map(|(_, shift)| shift * shift);
+        Estimate {
+            value: dot(functional, &self.parts.coefficients),
+            u: (independent + common.sum::<f64>()).sqrt(),
+            u_independent: independent.sqrt(),
+        }
+    }
+
+    fn budget(&self, functional: &[f64]) -> Vec<Contribution> {
+        let independent = self.independent_variance(functional).sqrt();
+        let first = Contribution { name: INDEPENDENT.to_owned(), u: independent };
+        let common = self.common_shifts(functional);
+        let common = common.map(|(name, shift)| Contribution { name: name.into(), u: shift.abs() });
+        std::iter::once(first).chain(common).collect()
+    }
+
+    fn independent_variance(&self, functional: &[f64]) -> f64 {
+        self.factor_columns().map(|column| dot(column, functional).powi(2)).sum()
+    }
+
+    fn common_shifts(&self, functional: &[f64]) -> impl Iterator<Item = (&str, f64)> {
+        let shift = move |c: &CommonShift| dot(functional, &c.shift);
+        self.parts.shifts.iter().map(move |c| (c.name.as_str(), shift(c)))
+    }
+
+    /// The columns of S down to the diagonal.
+    fn factor_columns(&self) -> impl Iterator<Item = &[f64]> {
+        (0..self.basis.len()).map(|j| &self.parts.factor[j * (j + 1) / 2..][..=j])
+    }
+}
+
+impl Estimate {
+    fn times(self, factor: f64) -> Self {
+        Self {
+            value: self.value * factor,
+            u: self.u * factor.abs(),
+            u_independent: self.u_independent * factor.abs(),
+        }
+    }
+}
+
+fn demand(what: &'static str, expected: usize, numbers: &[f64]) -> Result<(), FitError> {
+    let found = numbers.iter().filter(|number| number.is_finite()).count();
+    if found == expected && numbers.len() == expected {
+        Ok(())
+    } else {
+        Err(FitError::Parts { what, expected, found })
+    }
+}
+
+/// The budget's name for what is independent from reading to reading.
+const INDEPENDENT: &str = "independent";

@@ -1,0 +1,190 @@
+//! Where the fitted field is largest within its region: a grid that no lobe of the basis slips
+//! through, then a search downhill in step size from the best places. Deterministic.
+
+use crate::basis::dot;
+use crate::{Estimate, Fit, Ray, Region};
+use std::f64::consts::TAU;
+
+/// The largest value of the field within the region and its cone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// The radiance there. The largest of noisy values is on average above the true largest one by
+    /// a part of u, which u doesn't include.
+    pub radiance: Estimate,
+    /// Where it is, φ in (-π, π].
+    pub ray: Ray,
+}
+
+impl Fit {
+    /// The largest radiance within the region and its cone. Where several are equal, the one
+    /// nearest the normal.
+    pub fn peak(&self) -> Peak {
+        let mut best: Option<(Place, f64)> = None;
+        for start in self.starts() {
+            let (place, value) = self.climb(start);
+            let margin = TIE_RELATIVE * value.abs();
+            if best.is_none_or(|(_, top)| value > top + margin) {
+                best = Some((place, value));
+            }
+        }
+        let place = best.map_or(Place::CENTRE, |(place, _)| place);
+        let ray = place.ray(self.region());
+        Peak { radiance: self.radiance(&ray), ray }
+    }
+
+    /// The best places of the grid, a few of them so that a second lobe has its chance.
+    fn starts(&self) -> Vec<Place> {
+        let basis = self.functions();
+        let directions = directions(self.region().theta_max_rad, basis.spec().angular_degree);
+        let mut z = vec![0.0; basis.angular_len()];
+        let mut folded = vec![0.0; basis.angular_len()];
+        let mut scratch = basis.scratch();
+        let mut starts: Vec<(Place, f64)> = Vec::new();
+        for (a, b) in positions(basis.spec().position_degree) {
+            let position = Place { a, b, ..Place::CENTRE };
+            basis.position(&position.ray(self.region()), &mut scratch);
+            folded.fill(0.0);
+            for (p, block) in
+                scratch.position().iter().zip(self.coefficients().chunks_exact(folded.len()))
+            {
+                folded.iter_mut().zip(block).for_each(|(f, c)| *f += p * c);
+            }
+            for &(u, v) in &directions {
+                let place = Place { u, v, a, b };
+                let ray = place.ray(self.region());
+                basis.direction(ray.theta_rad, ray.phi_rad, &mut z);
+                keep(&mut starts, place, dot(&folded, &z));
+            }
+        }
+        starts.into_iter().map(|(place, _)| place).collect()
+    }
+
+    /// Steps along the axes while that rises, with ever smaller steps.
+    fn climb(&self, start: Place) -> (Place, f64) {
+        let basis = self.functions();
+        let mut scratch = basis.scratch();
+        let r_max = libm::sin(self.region().theta_max_rad);
+        let mut at = |place: Place| {
+            basis.value(self.coefficients(), &place.ray(self.region()), &mut scratch)
+        };
+        let (mut place, mut value) = (start, at(start));
+        let mut step = STEP_FIRST / (basis.spec().angular_degree + 1) as f64;
+        for _ in 0..STEPS_MAX {
+            let around = place.neighbours(step, r_max);
+            let best = around.map(|place| (place, at(place)));
+            let best = best.into_iter().fold((place, value), |a, b| if b.1 > a.1 { b } else { a });
+            if best.1 > value + TIE_RELATIVE * value.abs() {
+                (place, value) = best;
+            } else if step < STEP_LAST {
+                break;
+            } else {
+                step *= 0.5;
+            }
+        }
+        (place, value)
+    }
+}
+
+/// A ray by its point on the Nusselt disk and its position scaled to [-1, 1]².
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Place {
+    u: f64,
+    v: f64,
+    a: f64,
+    b: f64,
+}
+
+impl Place {
+    const CENTRE: Self = Self { u: 0.0, v: 0.0, a: 0.0, b: 0.0 };
+
+    fn ray(self, region: &Region) -> Ray {
+        let between = |t: f64, (from, to): (f64, f64)| 0.5 * ((1.0 - t) * from + (1.0 + t) * to);
+        Ray {
+            x_m: between(self.a, region.x_m),
+            y_m: between(self.b, region.y_m),
+            theta_rad: libm::asin(libm::hypot(self.u, self.v).min(1.0)),
+            phi_rad: libm::atan2(self.v, self.u),
+        }
+    }
+
+    /// The places a step away along each axis and diagonally on the disk, brought back within the
+    /// cone and the region. The diagonals and the turns follow ridges that the axes miss.
+    fn neighbours(self, step: f64, r_max: f64) -> [Self; 14] {
+        const AXES: [(f64, f64); 8] = [
+            (1.0, 0.0),
+            (-1.0, 0.0),
+            (0.0, 1.0),
+            (0.0, -1.0),
+            (0.7, 0.7),
+            (-0.7, 0.7),
+            (0.7, -0.7),
+            (-0.7, -0.7),
+        ];
+        let disk = |(u, v): (f64, f64)| {
+            let outside = (libm::hypot(u, v) / r_max).max(1.0);
+            Self { u: u / outside, v: v / outside, ..self }
+        };
+        let side = |t: f64| t.clamp(-1.0, 1.0);
+        let mut places = [self; 14];
+        for (place, (du, dv)) in places.iter_mut().zip(AXES) {
+            *place = disk((self.u + step * du, self.v + step * dv));
+        }
+        for (place, turn) in places[8..].iter_mut().zip([step, -step]) {
+            let (sin, cos) = libm::sincos(turn);
+            *place = disk((self.u * cos - self.v * sin, self.u * sin + self.v * cos));
+        }
+        for (place, sign) in places[10..].iter_mut().zip([1.0, -1.0]) {
+            *place = Self { a: side(self.a + sign * step), ..self };
+        }
+        for (place, sign) in places[12..].iter_mut().zip([1.0, -1.0]) {
+            *place = Self { b: side(self.b + sign * step), ..self };
+        }
+        places
+    }
+}
+
+/// Points on the disk within the cone, the centre first, rings outwards; dense at the rim, where
+/// polynomials turn fastest.
+fn directions(theta_max_rad: f64, degree: usize) -> Vec<(f64, f64)> {
+    let rings = 2 * (degree + 1);
+    let spokes = 4 * (degree + 1);
+    let mut points = vec![(0.0, 0.0)];
+    for ring in 1..=rings {
+        let r = libm::sin(theta_max_rad * ring as f64 / rings as f64);
+        for spoke in 0..spokes {
+            let (sin, cos) = libm::sincos(TAU * spoke as f64 / spokes as f64);
+            points.push((r * cos, r * sin));
+        }
+    }
+    points
+}
+
+/// Positions in [-1, 1]², the centre first.
+fn positions(degree: usize) -> Vec<(f64, f64)> {
+    let half = degree.cast_signed();
+    let t = |i: isize| if half == 0 { 0.0 } else { i as f64 / half as f64 };
+    let mut positions: Vec<(f64, f64)> =
+        (-half..=half).flat_map(|i| (-half..=half).map(move |j| (t(i), t(j)))).collect();
+    positions.sort_by(|p, q| p.0.hypot(p.1).total_cmp(&q.0.hypot(q.1)));
+    positions
+}
+
+/// Keeps the best places in falling order; of equal ones the earlier.
+fn keep(starts: &mut Vec<(Place, f64)>, place: Place, value: f64) {
+    let at = starts.partition_point(|(_, kept)| *kept >= value - TIE_RELATIVE * value.abs());
+    if at < STARTS {
+        starts.truncate(STARTS - 1);
+        starts.insert(at, (place, value));
+    }
+}
+
+/// From how many grid points the search starts.
+const STARTS: usize = 6;
+/// First step of the search times degree + 1: about the grid's spacing.
+const STEP_FIRST: f64 = 0.5;
+/// The search ends at this step on the unit disk: 3e-5 degrees.
+const STEP_LAST: f64 = 5e-7;
+/// Most steps of one search.
+const STEPS_MAX: usize = 400;
+/// Values closer than this are equal: rounding must not choose the place.
+const TIE_RELATIVE: f64 = 1e-12;

@@ -1,0 +1,136 @@
+//! Weights that follow from the fit itself.
+//!
+//! The variance of a reading is modelled from the *fitted* level and the fit is repeated until the
+//! weights settle. Weights from the reading's own value would favour readings that came out low:
+//! the flux of a source of N photons a reading would come out low by about one photon a reading.
+//!
+//! Where the residuals scatter beyond the stated noise (the basis can't follow the field, poses
+//! jitter, the source drifts) an excess variance, alike for all samples, is added so that the
+//! residuals are as large as they should be (Paule & Mandel 1982, J. Res. NBS 87, 377).
+
+use crate::basis::Basis;
+use crate::solve::{levels, solve};
+use crate::{FitError, Noise, Sample, undetermined};
+
+/// Weights that agree with the fit that they lead to.
+pub(crate) struct Settled {
+    /// The fit of the last pass.
+    pub(crate) coefficients: Vec<f64>,
+    /// Its values along the samples' rays.
+    pub(crate) levels: Vec<f64>,
+    /// What the samples are weighted by.
+    pub(crate) variances: Vec<f64>,
+    /// The part of every variance that the stated noise doesn't hold.
+    pub(crate) excess: f64,
+}
+
+/// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes.
+pub(crate) fn settle(samples: &[Sample], basis: &Basis, dof: usize) -> Result<Settled, FitError> {
+    let model = Model::of(samples);
+    let mut settled = start(samples, model);
+    for pass in 0..PASSES_MAX {
+        let solution = solve(samples, basis, &settled.variances, &[])?;
+        if pass == 0 {
+            let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+            if spectrum.rank() < basis.len() {
+                return Err(undetermined::refusal(samples, basis, &spectrum));
+            }
+        }
+        settled.coefficients = solution.unknowns(0);
+        settled.levels = levels(samples, basis, &settled.coefficients);
+        settled.excess = excess(samples, &settled.levels, model, dof);
+        let next = model.variances(samples, &settled.levels, settled.excess);
+        let change = next.iter().zip(&settled.variances).map(|(a, b)| (a / b - 1.0).abs());
+        let is_settled = change.fold(0.0, f64::max) < SETTLED_RELATIVE;
+        settled.variances = next;
+        if is_settled {
+            break;
+        }
+    }
+    Ok(settled)
+}
+
+/// Before anything is fitted every sample is taken to lie at the mean of all.
+fn start(samples: &[Sample], model: Model) -> Settled {
+    let mean = samples.iter().map(|s| s.value / samples.len() as f64).sum::<f64>();
+    let levels = vec![mean; samples.len()];
+    let excess = if has_unknown(samples) { model.mean_square } else { 0.0 };
+    let variances = model.variances(samples, &levels, excess);
+    Settled { coefficients: Vec::new(), levels, variances, excess }
+}
+
+/// Whether the noise of any sample is left to the residuals.
+pub(crate) fn has_unknown(samples: &[Sample]) -> bool {
+    samples.iter().any(|s| s.noise == Noise::Unknown)
+}
+
+/// How a variance follows from a level.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Model {
+    /// Of the values; 1 where all are 0.
+    mean_square: f64,
+}
+
+impl Model {
+    pub(crate) fn of(samples: &[Sample]) -> Self {
+        let n = samples.len() as f64;
+        let mean_square = samples.iter().map(|s| s.value * s.value / n).sum::<f64>();
+        Self { mean_square: if mean_square > 0.0 { mean_square } else { 1.0 } }
+    }
+
+    /// The stated variance of a sample whose fitted level is this. Where nothing is stated it is
+    /// no more than rounding: the excess has to say the rest.
+    pub(crate) fn variance(self, noise: Noise, level: f64) -> f64 {
+        match noise {
+            Noise::Fixed { variance } => variance,
+            Noise::Modelled { floor, per_radiance } => floor + per_radiance * level.max(0.0),
+            Noise::Unknown => f64::EPSILON.powi(2) * self.mean_square,
+        }
+    }
+
+    fn variances(self, samples: &[Sample], levels: &[f64], excess: f64) -> Vec<f64> {
+        samples.iter().zip(levels).map(|(s, l)| self.variance(s.noise, *l) + excess).collect()
+    }
+}
+
+/// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof; 0 where the
+/// stated noise explains the residuals.
+fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: usize) -> f64 {
+    let terms: Vec<(f64, f64)> = samples
+        .iter()
+        .zip(levels)
+        .map(|(s, l)| ((s.value - l).powi(2), model.variance(s.noise, *l)))
+        .collect();
+    let sum = |tau2: f64, power: i32| -> f64 {
+        terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()
+    };
+    let dof = dof as f64;
+    let threshold =
+        if has_unknown(samples) { dof } else { dof + EXCESS_SIGMA * (2.0 * dof).sqrt() };
+    if dof == 0.0 || sum(0.0, 1) <= threshold {
+        return 0.0;
+    }
+    // Newton's method on 1/Σ, which is concave and rising: from 0 it rises to the root.
+    let mut tau2 = 0.0;
+    for _ in 0..NEWTON_MAX {
+        let s = sum(tau2, 1);
+        let step = (1.0 / dof - 1.0 / s) * s * s / sum(tau2, 2);
+        tau2 += step;
+        if step <= NEWTON_RELATIVE * tau2 {
+            break;
+        }
+    }
+    tau2
+}
+
+/// More passes than a fit with weights that settle needs (2 to 4).
+const PASSES_MAX: usize = 8;
+/// Weights are settled when no variance changes by more: the fit is stationary against its
+/// weights, so that what is left is of second order.
+const SETTLED_RELATIVE: f64 = 0.01;
+/// The excess is taken for real beyond this many standard deviations of chi².
+const EXCESS_SIGMA: f64 = 3.0;
+/// More steps than Newton's method needs from any start.
+const NEWTON_MAX: usize = 60;
+/// The excess is as exact as this.
+const NEWTON_RELATIVE: f64 = 1e-6;
