@@ -1,15 +1,32 @@
 //! The simulated rig: a scene compiled to just the effects that it calls for, behind the same
 //! firmware core and the same wire as a real rig.
 //!
-//! [`Scene`] says what emits, [`Nominal`] what the rig file states.
+//! [`Scene`] says what emits, [`Nominal`] what the rig file states, [`Simulated`] what a real rig
+//! would keep to itself. [`compile()`] turns them and a seed into a [`Compiled`] rig: its rows of
+//! effects, its truth, and the [`SimulatedBoard`] that the device core drives.
 //!
 //! The crate does not know the host: not its kinematics, not its calibration, not its files. It
 //! computes from its own mechanical truth, so that a wrong sign on either side shows.
 
+mod board;
+mod chance;
+mod compile;
+mod detector;
+mod effect;
+mod mechanics;
 mod nominal;
+mod rows;
 mod scene;
+mod simulated;
+mod truth;
 
+pub use board::SimulatedBoard;
+pub use compile::{CompileError, Compiled, compile};
+pub use effect::{Bound, BoundUnit, EffectRow};
+pub use mechanics::SeenRay;
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use scene::{
     EXPONENT_MAX, Emitter, Law, Load, Scene, SceneError, Shape, Tabulated, TabulatedError,
 };
+pub use simulated::{LinkFaults, Simulated};
+pub use truth::{Peak, Region, Truth};

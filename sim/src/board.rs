@@ -1,0 +1,163 @@
+//! The board under the simulated device: axes that follow their setpoints, and a detector that
+//! sees the scene from where the axes really stand.
+
+use std::sync::Arc;
+
+use firmware_protocol::{AxisIdentity, Board, BoardFault, Illumination, Instant, Shutter};
+
+use crate::Compiled;
+use crate::chance::mix;
+use crate::detector::Stages;
+use crate::mechanics::{Axis, SeenRay, forward};
+
+/// A simulated rig's hardware. It answers after the fact, so that a device core is woken when
+/// something ends and not for every ADC reading.
+#[derive(Debug)]
+pub struct SimulatedBoard {
+    compiled: Arc<Compiled>,
+    boot_id: u32,
+    /// In channel order.
+    identities: Vec<AxisIdentity>,
+    /// In the order θ, φ, x, y.
+    axes: [Axis; 4],
+    /// The axis of each channel.
+    axis_of_channel: [usize; 4],
+    stages: Stages,
+    dwell: Dwelling,
+}
+
+/// What the detector sees while it dwells.
+#[derive(Debug)]
+struct Dwelling {
+    illumination: Illumination,
+    /// Photocurrent at rest, once the axes rest.
+    current_a: Option<f64>,
+}
+
+impl SimulatedBoard {
+    /// A rig that has just been switched on, for the `boot`-th time.
+    #[allow(clippy::cast_possible_truncation)] // a number among 2^32
+    pub fn new(compiled: Arc<Compiled>, boot: u32) -> Self {
+        let nominal = &compiled.nominal;
+        let mut axis_of_channel = [0; 4];
+        for (axis, nominal) in nominal.axes.iter().enumerate() {
+            axis_of_channel[usize::from(nominal.channel)] = axis;
+        }
+        let identities = axis_of_channel.iter().map(|axis| &nominal.axes[*axis]);
+        let identities = identities.map(|axis| AxisIdentity {
+            low: axis.travel_counts.0,
+            high: axis.travel_counts.1,
+            speed: axis.speed_counts_per_s,
+            acceleration: axis.acceleration_counts_per_s2,
+        });
+        Self {
+            boot_id: mix(mix(compiled.seed) ^ u64::from(boot)) as u32,
+            identities: identities.collect(),
+            axes: core::array::from_fn(|axis| Axis::at_boot(&compiled.axes[axis])),
+            axis_of_channel,
+            stages: compiled.stages(),
+            dwell: Dwelling {
+                illumination: Illumination { reading: 0, gain: 0, shutter: Shutter::Closed },
+                current_a: None,
+            },
+            compiled,
+        }
+    }
+
+    /// The ray that the detector really sees.
+    pub fn seen_ray(&self, now: Instant) -> SeenRay {
+        forward(core::array::from_fn(|axis| self.axes[axis].value(now)))
+    }
+
+    fn axis(&mut self, channel: u8) -> Option<&mut Axis> {
+        let axis = *self.axis_of_channel.get(usize::from(channel))?;
+        self.axes.get_mut(axis)
+    }
+
+    /// The light's current, amperes. At rest it is worked out once a dwell.
+    fn photocurrent_a(&mut self, now: Instant) -> f64 {
+        if let Some(current_a) = self.dwell.current_a {
+            return current_a;
+        }
+        let current_a = match self.dwell.illumination.shutter {
+            Shutter::Closed => 0.0,
+            Shutter::Open => {
+                let SeenRay { x_m, y_m, theta_rad, phi_rad } = self.seen_ray(now);
+                let radiance = self.compiled.scene.radiance(x_m, y_m, theta_rad, phi_rad);
+                radiance * self.compiled.current_per_radiance
+            }
+        };
+        if self.axes.iter().all(|axis| axis.rests_at() <= now) {
+            self.dwell.current_a = Some(current_a);
+        }
+        current_a
+    }
+}
+
+impl Board for SimulatedBoard {
+    fn axes(&self) -> &[AxisIdentity] {
+        &self.identities
+    }
+
+    fn gains(&self) -> u8 {
+        u8::try_from(self.compiled.nominal.detector.gains.len()).unwrap_or(u8::MAX)
+    }
+
+    fn adc(&self) -> (u8, u32) {
+        let detector = &self.compiled.nominal.detector;
+        (detector.adc_bits, detector.adc_rate_hz)
+    }
+
+    fn boot_id(&self) -> u32 {
+        self.boot_id
+    }
+
+    fn answers_late(&self) -> bool {
+        true
+    }
+
+    fn set_setpoint(&mut self, now: Instant, channel: u8, counts: f64) {
+        self.dwell.current_a = None;
+        if let Some(axis) = self.axis(channel) {
+            axis.set_setpoint(now, counts);
+        }
+    }
+
+    fn readback(&mut self, now: Instant, channel: u8) -> i32 {
+        let Some(&axis) = self.axis_of_channel.get(usize::from(channel)) else { return 0 };
+        self.axes[axis].readback(now, self.compiled.nominal.axes[axis].has_encoder)
+    }
+
+    fn begin_search(&mut self, _now: Instant, channel: u8) {
+        if let Some(axis) = self.axis(channel) {
+            axis.begin_search();
+        }
+    }
+
+    fn home_mark(&mut self, _now: Instant, channel: u8) -> Option<f64> {
+        self.axis(channel)?.home_mark()
+    }
+
+    fn set_home(&mut self, _now: Instant, channel: u8) {
+        self.dwell.current_a = None;
+        if let Some(axis) = self.axis(channel) {
+            axis.set_home();
+        }
+    }
+
+    fn begin_dwell(&mut self, _now: Instant, illumination: Illumination) {
+        self.dwell = Dwelling { illumination, current_a: None };
+        self.stages.begin(illumination.reading);
+    }
+
+    fn convert(&mut self, now: Instant) -> Result<i32, BoardFault> {
+        let light_a = self.photocurrent_a(now);
+        let current_a = self.stages.pass(light_a);
+        let gain = self.dwell.illumination.gain;
+        self.compiled.amplifier.convert(gain, current_a).ok_or(BoardFault::Detector)
+    }
+
+    fn fault(&mut self, _now: Instant) -> Option<BoardFault> {
+        None
+    }
+}

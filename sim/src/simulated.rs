@@ -1,0 +1,99 @@
+//! The rig file's `[simulated]` table: what a real rig would keep to itself. Its keys are listed
+//! here and nowhere else.
+
+use spanned_toml::{Bounds, Problem, Table};
+
+/// What the rig file can't know of a real rig. Everything absent is an effect absent.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Simulated {
+    /// Current without light, amperes; zero for none.
+    pub dark_current_a: f64,
+    /// Where the axes stand at boot, as fractions of their travel from its lower end, in the
+    /// order θ, φ, x, y. Drawn from the middle half of the travel where absent.
+    pub start: [Option<f64>; 4],
+    /// What goes wrong on the wire.
+    pub faults: LinkFaults,
+}
+
+/// What goes wrong on the wire, for tests of the link.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LinkFaults {
+    /// The probability that a byte is lost.
+    pub drop_rate: f64,
+    /// The probability that one bit of a byte is flipped.
+    pub corrupt_rate: f64,
+}
+
+impl LinkFaults {
+    /// Whether nothing goes wrong.
+    pub fn is_none(&self) -> bool {
+        self.drop_rate <= 0.0 && self.corrupt_rate <= 0.0
+    }
+}
+
+/// A photodiode that leaks more than this is broken.
+const DARK_CURRENT_A_MAX: f64 = 1e-3;
+
+/// More lost bytes than this and no frame gets through.
+const FAULT_RATE_MAX: f64 = 0.1;
+
+impl Simulated {
+    /// Reads the table `[simulated]`; unknown keys are refused.
+    pub fn read(table: Table<'_>) -> Result<Self, Problem> {
+        let dark = Bounds::between(-DARK_CURRENT_A_MAX, DARK_CURRENT_A_MAX);
+        let fraction = Bounds::between(0.0, 1.0);
+        let dark_current_a = table.number("dark_current_a", dark)?.unwrap_or(0.0);
+        let mut start = [None; 4];
+        if let Some(axes) = table.table("start_fraction_of_travel")? {
+            for (start, axis) in start.iter_mut().zip(AXIS_NAMES) {
+                *start = axes.number(axis, fraction)?;
+            }
+            axes.finish()?;
+        }
+        let mut faults = LinkFaults::default();
+        if let Some(link) = table.table("link")? {
+            let rate = Bounds::between(0.0, FAULT_RATE_MAX);
+            faults.drop_rate = link.number("drop_rate", rate)?.unwrap_or(0.0);
+            faults.corrupt_rate = link.number("corrupt_rate", rate)?.unwrap_or(0.0);
+            link.finish()?;
+        }
+        table.finish()?;
+        Ok(Self { dark_current_a, start, faults })
+    }
+}
+
+/// The axes' names in files, in the order of [`crate::Nominal::axes`].
+pub(crate) const AXIS_NAMES: [&str; 4] = ["theta", "phi", "x", "y"];
+
+#[cfg(test)]
+mod tests {
+    use spanned_toml::{Document, Source};
+
+    use super::*;
+
+    fn read(text: &str) -> Result<Simulated, Problem> {
+        let document = Document::parse(Source::new("rig.toml", text)).unwrap();
+        Simulated::read(document.root().required_table("simulated").unwrap())
+    }
+
+    #[test]
+    fn an_empty_table_calls_for_nothing() {
+        let simulated = read("[simulated]\n").unwrap();
+        assert_eq!(simulated, Simulated::default());
+        assert!(simulated.faults.is_none());
+    }
+
+    #[test]
+    fn keys_are_read_and_unknown_ones_refused() {
+        let text = "[simulated]\ndark_current_a = 1e-12\nlink.drop_rate = 0.01\n\
+                    start_fraction_of_travel = { theta = 0.5, y = 0 }\n";
+        let simulated = read(text).unwrap();
+        assert_eq!(simulated.start, [Some(0.5), None, None, Some(0.0)]);
+        assert!(!simulated.faults.is_none());
+        let problem = read("[simulated]\ndark_curent_a = 1e-12\n").unwrap_err();
+        assert!(problem.to_string().contains("did you mean `dark_current_a`?"), "{problem}");
+        for bad in ["dark_current_a = nan", "link.drop_rate = 0.5", "link.delay = 1"] {
+            assert!(read(&format!("[simulated]\n{bad}\n")).is_err(), "{bad}");
+        }
+    }
+}

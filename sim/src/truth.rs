@@ -1,0 +1,150 @@
+//! What leaves the sample, exactly: the numbers that a fit is compared with, by the same
+//! definitions. Free of detector, noise and beam.
+
+use radiometry::quadrature::gauss_legendre;
+
+use crate::Scene;
+
+/// Where a fit is asked for: a rectangle of the sample and the cone of directions around its
+/// normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// From low to high, metres.
+    pub x_m: (f64, f64),
+    /// From low to high, metres.
+    pub y_m: (f64, f64),
+    /// At most π/2, radians.
+    pub theta_max_rad: f64,
+}
+
+impl Region {
+    /// Square metres.
+    pub fn area_m2(&self) -> f64 {
+        (self.x_m.1 - self.x_m.0) * (self.y_m.1 - self.y_m.0)
+    }
+}
+
+/// The largest radiance of a region and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// In the scene's unit.
+    pub value: f64,
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Radians.
+    pub theta_rad: f64,
+    /// Radians.
+    pub phi_rad: f64,
+}
+
+/// What leaves the sample in a region.
+#[derive(Debug, Clone, Copy)]
+pub struct Truth<'c> {
+    scene: &'c Scene,
+    region: Region,
+}
+
+impl<'c> Truth<'c> {
+    pub(crate) const fn new(scene: &'c Scene, region: Region) -> Self {
+        Self { scene, region }
+    }
+
+    /// The region that it is taken over.
+    pub const fn region(&self) -> &Region {
+        &self.region
+    }
+
+    /// Radiance from (x, y) into (θ, φ), W·m⁻²·sr⁻¹ or cd·m⁻². Zero off every emitter.
+    pub fn radiance(&self, x_m: f64, y_m: f64, theta_rad: f64, phi_rad: f64) -> f64 {
+        self.scene.radiance(x_m, y_m, theta_rad, phi_rad)
+    }
+
+    /// Exitance into the whole hemisphere, the mean over the region's rectangle, W·m⁻² or
+    /// lm·m⁻².
+    pub fn exitance(&self) -> f64 {
+        self.exitance_up_to(core::f64::consts::FRAC_PI_2)
+    }
+
+    /// As [`Truth::exitance`], into the region's directions alone.
+    pub fn exitance_within_region(&self) -> f64 {
+        self.exitance_up_to(self.region.theta_max_rad)
+    }
+
+    /// Flux from the region's rectangle into the whole hemisphere, W or lm.
+    pub fn flux(&self) -> f64 {
+        self.exitance() * self.region.area_m2()
+    }
+
+    /// The largest radiance within the region. `None` where it has no bound: a table that ends
+    /// above zero at 90°, in a region that goes so far.
+    pub fn peak(&self) -> Option<Peak> {
+        let Region { x_m, y_m, theta_max_rad } = self.region;
+        let centre = (f64::midpoint(x_m.0, x_m.1), f64::midpoint(y_m.0, y_m.1));
+        let dark = Peak { value: 0.0, x_m: centre.0, y_m: centre.1, theta_rad: 0.0, phi_rad: 0.0 };
+        self.scene.emitters().iter().try_fold(dark, |peak, emitter| {
+            let Some((x_m, y_m)) = emitter.shape().point_within(x_m, y_m) else {
+                return Some(peak);
+            };
+            let (value, theta_rad, phi_rad) = emitter.peak_within(theta_max_rad)?;
+            let higher = Peak { value, x_m, y_m, theta_rad, phi_rad };
+            Some(if value > peak.value { higher } else { peak })
+        })
+    }
+
+    /// The throughput-weighted RMS of `fitted` (x, y, θ, φ) less the true radiance over the
+    /// region, divided by the throughput-weighted RMS of the truth. A midpoint rule in position
+    /// (`across` by `across` points) and Gauss-Legendre in sin²θ, which the weight cos θ dω asks
+    /// for; zero for a dark region that is fitted as dark.
+    pub fn radiance_error_rms_relative(
+        &self,
+        across: u32,
+        fitted: impl Fn(f64, f64, f64, f64) -> f64,
+    ) -> f64 {
+        let (mut error, mut size) = (0.0, 0.0);
+        self.for_each_ray(across, |weight, (x, y, theta, phi)| {
+            let truth = self.radiance(x, y, theta, phi);
+            let off = fitted(x, y, theta, phi) - truth;
+            error += weight * off * off;
+            size += weight * truth * truth;
+        });
+        if error > 0.0 { libm::sqrt(error / size) } else { 0.0 }
+    }
+
+    fn for_each_ray(&self, across: u32, mut visit: impl FnMut(f64, (f64, f64, f64, f64))) {
+        const RINGS: usize = 24;
+        const SECTORS: u32 = 48;
+        let Region { x_m, y_m, theta_max_rad } = self.region;
+        let step = |low: f64, high: f64, i: u32| {
+            low + (high - low) * (f64::from(i) + 0.5) / f64::from(across)
+        };
+        let sin_max = libm::sin(theta_max_rad);
+        for (node, weight) in gauss_legendre(RINGS) {
+            let theta = libm::asin(sin_max * libm::sqrt(f64::midpoint(1.0, node)));
+            for sector in 0..SECTORS {
+                let turn = (f64::from(sector) + 0.5) / f64::from(SECTORS) - 0.5;
+                let phi = core::f64::consts::TAU * turn;
+                for i in 0..across {
+                    for j in 0..across {
+                        let (x, y) = (step(x_m.0, x_m.1, i), step(y_m.0, y_m.1, j));
+                        visit(weight, (x, y, theta, phi));
+                    }
+                }
+            }
+        }
+    }
+
+    fn exitance_up_to(&self, theta_max_rad: f64) -> f64 {
+        let Region { x_m, y_m, .. } = self.region;
+        let flux: f64 = self
+            .scene
+            .emitters()
+            .iter()
+            .map(|emitter| {
+                emitter.shape().area_within_m2(x_m, y_m) * emitter.exitance_within(theta_max_rad)
+            })
+            .sum();
+        flux / self.region.area_m2()
+    }
+}
