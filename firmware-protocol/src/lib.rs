@@ -10,7 +10,9 @@ mod board;
 mod bounds;
 mod codec;
 mod decoder;
+mod device;
 mod device_core;
+mod device_link;
 pub mod frame;
 mod host;
 mod message;
@@ -21,9 +23,11 @@ mod time;
 pub use board::{Board, BoardFault, Illumination};
 pub use codec::{CodecError, EventType, ReplyType, RequestType};
 pub use decoder::{BadFrames, Decoder};
+pub use device::Device;
 pub use device_core::{
     DeviceCore, LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD,
 };
+pub use device_link::{DeviceEndpoint, Incoming, ReplyTo};
 pub use host::{
     HostEndpoint, HostEvent, LinkCause, LinkStatistics, Nonsense, SubmitError, Ticket, WINDOW,
 };

@@ -282,6 +282,13 @@ impl HostEndpoint {
             self.statistics.stale += 1;
             return;
         };
+        let (major, minor) = identity.protocol;
+        if major != PROTOCOL.0 {
+            self.close();
+            let device = (major, Some(minor));
+            self.tell(HostEvent::VersionMismatch { device, host: PROTOCOL });
+            return;
+        }
         self.phase = Phase::Open(boot_id);
         self.answer(now, &flight, Reply::Identity(identity));
     }
