@@ -1,1 +1,29 @@
-//! Room `journal`.
+//! The run file: raw readings, durable before they count.
+//!
+//! One SQLite file a run holds all that is needed to rebuild everything else: the header, every
+//! input file byte for byte, the fixed sequence of steps, the raw readings, the sessions in which
+//! they were taken, and what happened on the way. A reading counts only once
+//! [`Journal::append`] has returned.
+//!
+//! - [`Journal`] appends; one process at a time, held to that by a lock.
+//! - [`Reader`] reads, also while another process appends.
+//!
+//! This is the only room that knows SQL. It does not know what a reading means: radiance is
+//! derived elsewhere and can be derived again. It reads no clock; wall time is handed in as text.
+
+mod append;
+mod error;
+mod lock;
+mod read;
+mod record;
+mod schema;
+mod steps;
+#[cfg(test)]
+mod tests;
+
+pub use append::{Appended, Journal};
+pub use error::JournalError;
+pub use read::{Order, Reader};
+pub use record::{
+    Event, EventKind, Header, Input, InputRole, Record, ReferenceCheck, Session, Verdict,
+};

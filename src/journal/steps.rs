@@ -1,0 +1,116 @@
+//! The fixed sequence of steps as rows, so that a resume needs neither the plan's reader nor its
+//! optimiser to agree with those that made the run.
+
+use std::time::Duration;
+
+use firmware_protocol::Shutter;
+use rusqlite::types::Type;
+use rusqlite::{Connection, Row, params};
+
+use super::append::kind_columns;
+use super::read::kind_from_row;
+use crate::plan::Step;
+use crate::rig::{AxisPositions, Latched, Pose};
+
+const INSERT: &str = "
+INSERT INTO steps (id, kind, target_index, target_repeat, x_m, y_m, theta_rad, phi_rad,
+    axis_theta_rad, axis_phi_rad, axis_x_m, axis_y_m, theta, phi, x, y, via_theta, via_phi, via_x,
+    via_y, settle_ns, gain, dwell_ns, shutter, source_off)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20,
+    ?21, ?22, ?23, ?24, ?25)";
+
+pub(super) const SELECT: &str = "
+SELECT id, kind, target_index, target_repeat, x_m, y_m, theta_rad, phi_rad,
+    axis_theta_rad, axis_phi_rad, axis_x_m, axis_y_m, theta, phi, x, y, via_theta, via_phi, via_x,
+    via_y, settle_ns, gain, dwell_ns, shutter, source_off
+FROM steps ORDER BY position";
+
+pub(super) fn insert(connection: &Connection, step: &Step) -> rusqlite::Result<()> {
+    let (kind, index, repeat) = kind_columns(step.kind);
+    let pose = step.pose;
+    let AxisPositions([axis_theta_rad, axis_phi_rad, axis_x_m, axis_y_m]) = step.positions;
+    let Latched([theta, phi, x, y]) = step.counts;
+    let via = |i: usize| step.via.map(|via| via.0[i]);
+    connection.prepare_cached(INSERT)?.execute(params![
+        step.id,
+        kind,
+        index,
+        repeat,
+        pose.map(|pose| pose.x_m),
+        pose.map(|pose| pose.y_m),
+        pose.map(|pose| pose.theta_rad),
+        pose.map(|pose| pose.phi_rad),
+        axis_theta_rad,
+        axis_phi_rad,
+        axis_x_m,
+        axis_y_m,
+        theta,
+        phi,
+        x,
+        y,
+        via(0),
+        via(1),
+        via(2),
+        via(3),
+        nanoseconds(step.settle)?,
+        step.gain,
+        nanoseconds(step.dwell)?,
+        shutter_name(step.shutter),
+        step.source_off,
+    ])?;
+    Ok(())
+}
+
+pub(super) fn from_row(row: &Row<'_>) -> rusqlite::Result<Step> {
+    let latched = |first: usize| -> rusqlite::Result<Latched> {
+        Ok(Latched([
+            row.get(first)?,
+            row.get(first + 1)?,
+            row.get(first + 2)?,
+            row.get(first + 3)?,
+        ]))
+    };
+    let pose = match row.get::<_, Option<f64>>(4)? {
+        None => None,
+        Some(x_m) => {
+            Some(Pose { x_m, y_m: row.get(5)?, theta_rad: row.get(6)?, phi_rad: row.get(7)? })
+        }
+    };
+    let via = row.get::<_, Option<i32>>(16)?.map(|_| latched(16)).transpose()?;
+    Ok(Step {
+        id: row.get(0)?,
+        kind: kind_from_row(row, 1)?,
+        pose,
+        positions: AxisPositions([row.get(8)?, row.get(9)?, row.get(10)?, row.get(11)?]),
+        counts: latched(12)?,
+        via,
+        settle: duration(row, 20)?,
+        gain: row.get(21)?,
+        dwell: duration(row, 22)?,
+        shutter: match row.get::<_, String>(23)?.as_str() {
+            "closed" => Shutter::Closed,
+            // The table admits no third name.
+            _ => Shutter::Open,
+        },
+        source_off: row.get(24)?,
+    })
+}
+
+fn shutter_name(shutter: Shutter) -> &'static str {
+    match shutter {
+        Shutter::Closed => "closed",
+        Shutter::Open => "open",
+    }
+}
+
+fn nanoseconds(duration: Duration) -> rusqlite::Result<i64> {
+    i64::try_from(duration.as_nanos())
+        .map_err(|error| rusqlite::Error::ToSqlConversionFailure(error.into()))
+}
+
+fn duration(row: &Row<'_>, column: usize) -> rusqlite::Result<Duration> {
+    let nanoseconds: i64 = row.get(column)?;
+    u64::try_from(nanoseconds).map(Duration::from_nanos).map_err(|error| {
+        rusqlite::Error::FromSqlConversionFailure(column, Type::Integer, error.into())
+    })
+}
