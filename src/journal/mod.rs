@@ -16,6 +16,7 @@
 mod append;
 mod error;
 mod lock;
+mod queue;
 mod read;
 mod record;
 mod schema;
@@ -26,6 +27,7 @@ mod writer;
 
 pub use append::{Appended, Journal};
 pub use error::JournalError;
+pub use queue::{Queue, QueueState, QueuedRun};
 pub use read::{Order, Reader};
 pub use record::{
     Event, EventKind, Header, Input, InputRole, Record, ReferenceCheck, Session, Verdict,
