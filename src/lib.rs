@@ -14,6 +14,7 @@ pub mod device;
 pub mod export;
 pub mod journal;
 pub mod plan;
+pub mod report;
 pub mod rig;
 pub mod run;
 pub mod study;

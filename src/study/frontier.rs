@@ -1,0 +1,166 @@
+//! What accuracy costs in time: the rungs that are compared, and what many runs of them say. It
+//! does not know how a run is made.
+
+/// One scored run. Errors are against the truth, relative, with their sign where it has one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrontierRow {
+    /// The scene's name.
+    pub scene: String,
+    /// The strategy's name.
+    pub strategy: String,
+    /// The rung's parameters, `key=value` joined by spaces.
+    pub parameters: String,
+    /// The seed of the simulated rig.
+    pub seed: u64,
+    /// Rig time, seconds.
+    pub rig_s: f64,
+    /// Readings taken, dark and reference ones included.
+    pub readings: u32,
+    /// Throughput-weighted RMS over the region, relative to the truth's.
+    pub error_radiance_rms_relative: f64,
+    /// Fitted over true exitance, less one.
+    pub error_exitance_relative: f64,
+    /// Fitted over true flux, less one.
+    pub error_flux_relative: f64,
+    /// The standard uncertainty that the fit states for the exitance, relative.
+    pub u_exitance_relative: f64,
+    /// The same error of the radiance once the best common factor is taken out: what density and
+    /// dwell can buy, without what the calibration fixes.
+    pub error_shape_rms_relative: f64,
+    /// Wall time of the simulation and the fit, seconds.
+    pub compute_s: f64,
+}
+
+/// A rung of the ladder: how a plan's density and dwell are scaled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rung {
+    /// Factor on the number of targets.
+    pub density: f64,
+    /// Factor on the dwell.
+    pub dwell: f64,
+}
+
+/// Five rungs, each with about twice the integration time of the one below: more targets, and
+/// longer dwells, in equal parts of the factor.
+pub const LADDER: [Rung; 5] = [
+    Rung { density: 0.5, dwell: 0.5 },
+    Rung { density: 0.707, dwell: 0.707 },
+    Rung { density: 1.0, dwell: 1.0 },
+    Rung { density: 1.414, dwell: 1.414 },
+    Rung { density: 2.0, dwell: 2.0 },
+];
+
+/// What the seeds of one rung say together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrontierPoint {
+    /// As in the rows.
+    pub parameters: String,
+    /// Median rig time, seconds.
+    pub rig_s: f64,
+    /// Lowest, median and highest relative error of the radiance.
+    pub radiance: [f64; 3],
+    /// The same with the best common factor taken out.
+    pub shape: [f64; 3],
+    /// RMS over the seeds of the relative error of the exitance.
+    pub exitance_rms: f64,
+}
+
+/// One point a rung, in order of rig time. Rows of one rung are those with equal parameters.
+pub fn points(rows: &[FrontierRow]) -> Vec<FrontierPoint> {
+    let mut parameters: Vec<&str> = Vec::new();
+    for row in rows {
+        if !parameters.contains(&row.parameters.as_str()) {
+            parameters.push(&row.parameters);
+        }
+    }
+    let mut points: Vec<FrontierPoint> = parameters
+        .iter()
+        .map(|name| point(name, rows.iter().filter(|row| row.parameters == *name)))
+        .collect();
+    points.sort_by(|a, b| a.rig_s.total_cmp(&b.rig_s));
+    points
+}
+
+fn point<'a>(name: &str, rows: impl Iterator<Item = &'a FrontierRow> + Clone) -> FrontierPoint {
+    let spread = |value: fn(&FrontierRow) -> f64| {
+        let mut values: Vec<f64> = rows.clone().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        [values[0], median(&values), values[values.len() - 1]]
+    };
+    let squares: Vec<f64> =
+        rows.clone().map(|row| row.error_exitance_relative * row.error_exitance_relative).collect();
+    FrontierPoint {
+        parameters: name.to_owned(),
+        rig_s: spread(|row| row.rig_s)[1],
+        radiance: spread(|row| row.error_radiance_rms_relative),
+        shape: spread(|row| row.error_shape_rms_relative),
+        exitance_rms: libm::sqrt(squares.iter().sum::<f64>() / squares.len() as f64),
+    }
+}
+
+/// Of sorted values, at least one.
+fn median(sorted: &[f64]) -> f64 {
+    let middle = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
+}
+
+/// In words, what twice the time buys between two neighbouring points: the factor on the error
+/// of the radiance's shape, by the power law through both.
+pub fn doubling(lower: &FrontierPoint, upper: &FrontierPoint) -> Option<String> {
+    let (time, error) = (upper.rig_s / lower.rig_s, upper.shape[1] / lower.shape[1]);
+    if time <= 1.0 || !error.is_finite() || error <= 0.0 {
+        return None;
+    }
+    let factor = libm::exp2(libm::log(error) / libm::log(time));
+    Some(format!(
+        "from {:.0} s to {:.0} s: twice the time leaves {:.0} % of the error of the radiance's shape",
+        lower.rig_s,
+        upper.rig_s,
+        100.0 * factor
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(parameters: &str, seed: u64, rig_s: f64, error: f64) -> FrontierRow {
+        FrontierRow {
+            scene: "s".into(),
+            strategy: "stop-and-go".into(),
+            parameters: parameters.into(),
+            seed,
+            rig_s,
+            readings: 10,
+            error_radiance_rms_relative: error,
+            error_exitance_relative: -error,
+            error_flux_relative: -error,
+            u_exitance_relative: error,
+            error_shape_rms_relative: error,
+            compute_s: 0.1,
+        }
+    }
+
+    #[test]
+    fn rows_of_a_rung_make_one_point_in_order_of_time() {
+        let rows = [
+            row("b", 1, 200.0, 0.01),
+            row("a", 1, 100.0, 0.04),
+            row("a", 2, 100.0, 0.02),
+            row("b", 2, 200.0, 0.01),
+        ];
+        let points = points(&rows);
+        assert_eq!(points.len(), 2);
+        assert_eq!(points[0].parameters, "a");
+        assert_eq!(points[0].radiance, [0.02, 0.03, 0.04]);
+        assert!((points[0].exitance_rms - libm::sqrt(0.001)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn photon_noise_leaves_71_percent_for_twice_the_time() {
+        let points = points(&[row("a", 1, 100.0, 0.02), row("b", 1, 400.0, 0.01)]);
+        let text = doubling(&points[0], &points[1]).unwrap();
+        assert!(text.contains("leaves 71 %"), "{text}");
+        assert_eq!(doubling(&points[1], &points[0]), None);
+    }
+}

@@ -1,0 +1,79 @@
+//! How far a fitted radiance lies from a known one. It does not know where either comes from.
+
+use fit::{Ray, Region};
+use radiometry::quadrature::gauss_legendre;
+
+/// Nodes in sin²θ and in each of x and y; the azimuth takes the trapezoid rule, which is exact
+/// for harmonics below half its count.
+const THETA_NODES: usize = 32;
+const PHI_NODES: u32 = 48;
+const POSITION_NODES: usize = 4;
+
+/// The throughput-weighted RMS of `fitted - truth` over the region, divided by that of `truth`:
+/// a number without a unit, zero for a perfect fit. The weight is dT = cos θ dω dA, over the
+/// region's rectangle and the cone from the normal to its largest θ.
+///
+/// A product rule: Gauss-Legendre in sin²θ, x and y, the trapezoid rule in φ. Features narrower
+/// than its spacing (7.5° in φ) are seen only in part. A truth that vanishes everywhere has no
+/// relative error: the answer is `None`.
+pub fn radiance_error_rms_relative(
+    region: &Region,
+    fitted: impl Fn(&Ray) -> f64,
+    truth: impl Fn(&Ray) -> f64,
+) -> Option<f64> {
+    let sin_max = libm::sin(region.theta_max_rad);
+    let scale = |(low, high): (f64, f64), t: f64| low + (high - low) * 0.5 * (1.0 + t);
+    let positions = gauss_legendre(POSITION_NODES);
+    let mut error = 0.0;
+    let mut signal = 0.0;
+    for (t, weight_theta) in gauss_legendre(THETA_NODES) {
+        let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin_max * sin_max), t)));
+        for k in 0..PHI_NODES {
+            let turn = (f64::from(k) + 0.5) / f64::from(PHI_NODES);
+            let phi_rad = (2.0 * turn - 1.0) * core::f64::consts::PI;
+            for (tx, weight_x) in &positions {
+                for (ty, weight_y) in &positions {
+                    let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
+                    let ray = Ray { x_m, y_m, theta_rad, phi_rad };
+                    let weight = weight_theta * weight_x * weight_y;
+                    let expected = truth(&ray);
+                    let difference = fitted(&ray) - expected;
+                    error += weight * difference * difference;
+                    signal += weight * expected * expected;
+                }
+            }
+        }
+    }
+    (signal > 0.0).then(|| libm::sqrt(error / signal))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REGION: Region = Region {
+        x_m: (-0.01, 0.03),
+        y_m: (0.0, 0.02),
+        theta_max_rad: core::f64::consts::FRAC_PI_2,
+    };
+
+    #[test]
+    fn a_constant_relative_error_is_itself() {
+        let truth = |ray: &Ray| 3.0 + ray.x_m + libm::cos(ray.theta_rad);
+        let error = radiance_error_rms_relative(&REGION, |ray| 1.01 * truth(ray), truth).unwrap();
+        assert!((error - 0.01).abs() < 1e-14, "{error}");
+    }
+
+    #[test]
+    fn the_weight_is_throughput() {
+        // RMS of cos θ under cos θ dω over the hemisphere: sqrt(∫ cos³ / ∫ cos) = sqrt(1/2).
+        let error =
+            radiance_error_rms_relative(&REGION, |ray| 1.0 + libm::cos(ray.theta_rad), |_| 1.0);
+        assert!((error.unwrap() - libm::sqrt(0.5)).abs() < 1e-12, "{error:?}");
+    }
+
+    #[test]
+    fn a_dark_truth_has_no_relative_error() {
+        assert_eq!(radiance_error_rms_relative(&REGION, |_| 1.0, |_| 0.0), None);
+    }
+}
