@@ -2,6 +2,9 @@
 //! where a simulated rig is put together; after it there are types.
 
 mod args;
+mod failure;
+mod inputs;
+mod nominal;
 
 use std::process::ExitCode;
 
