@@ -15,6 +15,7 @@ mod detector;
 mod effect;
 mod mechanics;
 mod nominal;
+mod pty;
 mod rows;
 mod scene;
 mod simulated;
@@ -25,6 +26,7 @@ pub use compile::{CompileError, Compiled, compile};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use mechanics::SeenRay;
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
+pub use pty::Pty;
 pub use scene::{
     EXPONENT_MAX, Emitter, Law, Load, Scene, SceneError, Shape, Tabulated, TabulatedError,
 };
