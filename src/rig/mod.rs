@@ -5,6 +5,7 @@
 //! hardware exists.
 
 mod axis;
+pub mod calibration;
 mod detector;
 mod file;
 mod kinematics;

@@ -1,0 +1,109 @@
+//! What many samples share: being off by it shifts them all together, so that no average over them
+//! makes it smaller.
+
+use super::{Dark, Sample};
+use crate::rig::{AXES, AxisName, AxisPositions, Pose, Rig, forward};
+
+/// A source of uncertainty that samples share. Components are independent of each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component {
+    /// What it is, as a budget's row names it.
+    pub name: String,
+    /// Its standard uncertainty: relative for [`Effect::Scale`], in the unit of radiance for
+    /// [`Effect::Offset`], radians or metres for [`Effect::Axis`].
+    pub u: f64,
+    /// What it does, and to which samples.
+    pub effect: Effect,
+}
+
+/// What being off by a component does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// Values are too large by the factor 1 + u.
+    Scale {
+        /// In this gain range alone; `None` in all.
+        gain: Option<u8>,
+    },
+    /// Values are too large by u.
+    Offset {
+        /// In this gain range alone.
+        gain: u8,
+    },
+    /// The axis stands u further on than its position says.
+    Axis {
+        /// Which axis.
+        axis: AxisName,
+        /// In this session alone; `None` in all.
+        session: Option<u32>,
+    },
+}
+
+impl Component {
+    /// Whether it concerns the sample.
+    pub fn concerns(&self, sample: &Sample) -> bool {
+        match self.effect {
+            Effect::Scale { gain } => gain.is_none_or(|gain| gain == sample.gain),
+            Effect::Offset { gain } => gain == sample.gain,
+            Effect::Axis { session, .. } => session.is_none_or(|session| session == sample.session),
+        }
+    }
+
+    /// By how much the sample's value is too large if the component is off by one u, at the
+    /// sample's level; 0 for axes.
+    pub fn excess(&self, sample: &Sample, level: f64) -> f64 {
+        match self.effect {
+            Effect::Scale { .. } if self.concerns(sample) => self.u * level,
+            Effect::Offset { .. } if self.concerns(sample) => self.u,
+            _ => 0.0,
+        }
+    }
+
+    /// The ray that was really seen if the component is off by one u.
+    pub fn ray_seen(&self, sample: &Sample) -> Pose {
+        match self.effect {
+            Effect::Axis { axis, .. } if self.concerns(sample) => {
+                let AxisPositions(mut positions) = sample.positions;
+                for (position, name) in positions.iter_mut().zip(AXES) {
+                    *position += if name == axis { self.u } else { 0.0 };
+                }
+                forward(AxisPositions(positions))
+            }
+            _ => sample.pose,
+        }
+    }
+}
+
+/// The components of a rig's samples, those with u = 0 left out.
+pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component> {
+    let detector = &rig.detector;
+    let everywhere = Effect::Scale { gain: None };
+    let mut all = vec![
+        component("responsivity", detector.u_responsivity_relative, everywhere),
+        component("throughput", detector.u_throughput_relative(), everywhere),
+    ];
+    for dark in darks.iter().filter(|dark| samples.iter().any(|s| s.gain == dark.gain)) {
+        let gain = &detector.gains[usize::from(dark.gain)];
+        let scale = Effect::Scale { gain: Some(dark.gain) };
+        all.push(component(&format!("gain {}", gain.name), gain.u_relative, scale));
+        let offset = Effect::Offset { gain: dark.gain };
+        all.push(component(&format!("dark {}", gain.name), dark.u_radiance, offset));
+    }
+    let mut sessions: Vec<u32> = samples.iter().map(|sample| sample.session).collect();
+    sessions.sort_unstable();
+    sessions.dedup();
+    for axis in &rig.axes {
+        let name = axis.name.name();
+        let zero = Effect::Axis { axis: axis.name, session: None };
+        all.push(component(&format!("{name} zero"), axis.u_zero, zero));
+        for &session in &sessions {
+            let homing = Effect::Axis { axis: axis.name, session: Some(session) };
+            all.push(component(&format!("{name} homing {session}"), axis.u_homing, homing));
+        }
+    }
+    all.retain(|component| component.u > 0.0);
+    all
+}
+
+fn component(name: &str, u: f64, effect: Effect) -> Component {
+    Component { name: name.to_owned(), u, effect }
+}
