@@ -1,1 +1,16 @@
-//! Room `device`.
+//! How hardware is spoken to: links, which know bytes, and drivers, which know what bytes mean to
+//! one kind of device. A simulated rig is one more link; nothing here can tell.
+//!
+//! This room does not know poses, radiance or files.
+
+mod agreement;
+mod link;
+mod native;
+mod ports;
+mod serial;
+
+pub use agreement::{Disagreement, check_agreement};
+pub use link::Link;
+pub use native::{ConnectError, DeviceEvent, LinkLost, Native};
+pub use ports::{PortEntry, list_ports};
+pub use serial::{SerialError, SerialSettings, open_serial};

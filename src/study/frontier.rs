@@ -1,5 +1,5 @@
-//! What accuracy costs in time: the rungs that are compared, and what many runs of them say. It
-//! does not know how a run is made.
+//! What accuracy costs in time: what many scored runs of the rungs say together. It does not know
+//! how a run is made.
 
 /// One scored run. Errors are against the truth, relative, with their sign where it has one.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,25 +30,6 @@ pub struct FrontierRow {
     /// Wall time of the simulation and the fit, seconds.
     pub compute_s: f64,
 }
-
-/// A rung of the ladder: how a plan's density and dwell are scaled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rung {
-    /// Factor on the number of targets.
-    pub density: f64,
-    /// Factor on the dwell.
-    pub dwell: f64,
-}
-
-/// Five rungs, each with about twice the integration time of the one below: more targets, and
-/// longer dwells, in equal parts of the factor.
-pub const LADDER: [Rung; 5] = [
-    Rung { density: 0.5, dwell: 0.5 },
-    Rung { density: 0.707, dwell: 0.707 },
-    Rung { density: 1.0, dwell: 1.0 },
-    Rung { density: 1.414, dwell: 1.414 },
-    Rung { density: 2.0, dwell: 2.0 },
-];
 
 /// What the seeds of one rung say together.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,9 @@
 //! handed a way to run a plan; it does not know rigs, clocks or files.
 
 mod frontier;
+mod ladder;
 mod score;
 
-pub use frontier::{FrontierPoint, FrontierRow, LADDER, Rung, doubling, points};
+pub use frontier::{FrontierPoint, FrontierRow, doubling, points};
+pub use ladder::{LADDER, Rung};
 pub use score::radiance_error_rms_relative;

@@ -1,0 +1,114 @@
+//! A plan at other densities and dwells: the rungs of what accuracy costs in time.
+
+use std::time::Duration;
+
+use crate::plan::{Plan, Schedule};
+
+/// A rung of the ladder: how a plan's density and dwell are scaled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rung {
+    /// Factor on the number of targets.
+    pub density: f64,
+    /// Factor on the dwell.
+    pub dwell: f64,
+}
+
+/// Five rungs, each with about twice the integration time of the one below: more targets and
+/// longer dwells, in equal parts of the factor. The plan itself stands in the middle.
+pub const LADDER: [Rung; 5] = [
+    Rung { density: 0.5, dwell: 0.5 },
+    Rung { density: core::f64::consts::FRAC_1_SQRT_2, dwell: core::f64::consts::FRAC_1_SQRT_2 },
+    Rung { density: 1.0, dwell: 1.0 },
+    Rung { density: core::f64::consts::SQRT_2, dwell: core::f64::consts::SQRT_2 },
+    Rung { density: 2.0, dwell: 2.0 },
+];
+
+/// Finer steps than these are finer than any rig: see the plan's own bounds.
+const STEP_DEG_MIN: f64 = 0.01;
+
+impl Rung {
+    /// The plan with its number of targets and its dwell scaled. Steps in φ and C keep dividing
+    /// the circle; the grid over the sample stays, since it is the fit's degree in position that
+    /// asks for it. A list of poses has no density: it stays as it is, and only its dwell scales.
+    #[must_use]
+    pub fn apply(&self, plan: &Plan) -> Plan {
+        let mut plan = plan.clone();
+        let finer = libm::sqrt(self.density);
+        let finer_step = |step: f64| (step / finer).max(STEP_DEG_MIN);
+        let finer_turn = |step: f64| 360.0 / libm::round(360.0 / step * finer).max(1.0);
+        plan.schedule = match plan.schedule {
+            Schedule::CGamma { x_count, y_count, c_step_deg, gamma_step_deg } => Schedule::CGamma {
+                x_count,
+                y_count,
+                c_step_deg: finer_turn(c_step_deg),
+                gamma_step_deg: finer_step(gamma_step_deg),
+            },
+            Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
+                Schedule::Raster {
+                    x_count,
+                    y_count,
+                    theta_step_deg: finer_step(theta_step_deg),
+                    phi_step_deg: finer_turn(phi_step_deg),
+                }
+            }
+            Schedule::LowDiscrepancy { count } => {
+                Schedule::LowDiscrepancy { count: scaled_count(count, self.density) }
+            }
+            list @ Schedule::List { .. } => list,
+        };
+        plan.dwell = whole_micros(plan.dwell.mul_f64(self.dwell));
+        plan
+    }
+
+    /// As a row of frontier.csv names it.
+    pub fn parameters(&self) -> String {
+        format!("density={:.3} dwell={:.3}", self.density, self.dwell)
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is positive
+fn scaled_count(count: u32, factor: f64) -> u32 {
+    (libm::round(f64::from(count) * factor) as u32).max(1)
+}
+
+/// The wire counts microseconds.
+fn whole_micros(duration: Duration) -> Duration {
+    Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use spanned_toml::{Document, Source};
+
+    use super::*;
+
+    fn plan(schedule: &str) -> Plan {
+        let text = format!(
+            "[region]\nx_mm = [-1, 1]\ny_mm = [-1, 1]\ntheta_max_deg = 80\n[schedule]\n{schedule}\n\
+             [dwell]\ndwell_ms = 50\n[dark]\nmethod = \"shutter\"\n\
+             [fit]\nangular_degree = 2\nposition_degree = 0\n"
+        );
+        Plan::read(Document::parse(Source::new("plan.toml", &text)).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_middle_rung_is_the_plan_itself() {
+        let plan = plan("kind = \"low-discrepancy\"\ncount = 500");
+        let same = LADDER[2].apply(&plan);
+        assert_eq!((same.schedule, same.dwell), (plan.schedule, plan.dwell));
+    }
+
+    #[test]
+    fn density_scales_targets_and_turns_stay_whole() {
+        let plan = plan(
+            "kind = \"raster\"\nx_count = 1\ny_count = 1\ntheta_step_deg = 10\nphi_step_deg = 30",
+        );
+        let finer = LADDER[4].apply(&plan);
+        let Schedule::Raster { theta_step_deg, phi_step_deg, .. } = finer.schedule else {
+            panic!("a raster stays a raster");
+        };
+        assert!((theta_step_deg - 10.0 / libm::sqrt(2.0)).abs() < 1e-12);
+        assert!((360.0 / phi_step_deg - 17.0).abs() < 1e-12, "{phi_step_deg}");
+        assert_eq!(finer.dwell, Duration::from_millis(100));
+    }
+}
