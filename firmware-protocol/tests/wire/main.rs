@@ -1,0 +1,7 @@
+//! The wire from end to end: golden bytes, damaged bytes, and two ends in lock step.
+
+mod golden;
+mod link;
+mod pair;
+mod stream;
+mod vectors;
