@@ -2,8 +2,10 @@
 //!
 //! It does not know what is looked at: the sample's radiance comes in as an argument.
 
-use std::f64::consts::PI;
 use std::time::Duration;
+
+use radiometry::DomainError;
+use radiometry::throughput::CoaxialDisks;
 
 /// Elementary charge, coulomb (exact, SI 2019).
 const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
@@ -11,6 +13,9 @@ const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
 /// errors of successive readings are as good as independent (Widrow and Kollár 2008, ch. 9: the
 /// residual dependence is below 2 %).
 const DITHER_LSB_MIN: f64 = 0.5;
+
+/// Why a beam always has a throughput.
+const CHECKED: &str = "spot, pupil and distance were checked when the rig was read";
 
 /// What the detector's calibration makes of its current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,32 +173,25 @@ impl Detector {
 
     /// The throughput T of its beam, m² sr: that of two coaxial disks, spot and pupil, exactly.
     pub fn throughput_m2_sr(&self) -> f64 {
-        let (a, b) = (self.spot_radius_m, self.pupil_radius_m);
-        let (sum, root) = self.disk_terms();
-        2.0 * PI * PI * a * a * b * b / (sum + root)
+        self.disks().and_then(CoaxialDisks::throughput).expect(CHECKED).m2_sr()
     }
 
     /// The relative standard uncertainty of the throughput, from those of spot, pupil and
-    /// distance by the closed form's partial derivatives. The same for all readings of a rig.
+    /// distance by its partial derivatives. The same for all readings of a rig.
     pub fn u_throughput_relative(&self) -> f64 {
-        let (a, b, d) = (self.spot_radius_m, self.pupil_radius_m, self.distance_m);
-        let (sum, root) = self.disk_terms();
-        let by_spot = (sum + root - 2.0 * a * a) / (a * root);
-        let by_pupil = (sum + root - 2.0 * b * b) / (b * root);
-        let by_distance = -2.0 * d / root;
+        let partials = self.disks().and_then(CoaxialDisks::partials).expect(CHECKED);
         let terms = [
-            by_spot * self.u_spot_radius_m,
-            by_pupil * self.u_pupil_radius_m,
-            by_distance * self.u_distance_m,
+            partials.per_radius_1 * self.u_spot_radius_m,
+            partials.per_radius_2 * self.u_pupil_radius_m,
+            partials.per_distance * self.u_distance_m,
         ];
-        libm::sqrt(terms.iter().map(|term| term * term).sum())
+        let u_m2_sr = libm::sqrt(terms.iter().map(|term| term * term).sum());
+        u_m2_sr / self.throughput_m2_sr()
     }
 
-    /// With S = a² + b² + d², a and b the disks' radii and d their distance: S, and
-    /// Q = sqrt(S² - 4 a² b²). T = π²/2 (S - Q) = 2 π² a² b² / (S + Q).
-    fn disk_terms(&self) -> (f64, f64) {
-        let (a, b, d) = (self.spot_radius_m, self.pupil_radius_m, self.distance_m);
-        (a * a + b * b + d * d, libm::hypot(d, a + b) * libm::hypot(d, a - b))
+    /// Spot and pupil; an error only for lengths that the rig reader refuses.
+    pub(super) fn disks(&self) -> Result<CoaxialDisks, DomainError> {
+        CoaxialDisks::new(self.spot_radius_m, self.pupil_radius_m, self.distance_m)
     }
 
     /// One count in ampere.
@@ -235,5 +233,88 @@ impl Detector {
     /// Full scale of a range, ampere; NaN for one that does not exist.
     fn full_scale_a(&self, gain: u8) -> f64 {
         self.gains.get(usize::from(gain)).map_or(f64::NAN, |gain| gain.full_scale_a)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Rig;
+    use super::*;
+
+    fn detector() -> Detector {
+        Rig::built_in().unwrap().detector
+    }
+
+    #[test]
+    fn far_away_the_throughput_is_both_areas_over_the_squared_distance() {
+        let detector = Detector { distance_m: 300.0, ..detector() };
+        let areas = std::f64::consts::PI.powi(2)
+            * detector.spot_radius_m.powi(2)
+            * detector.pupil_radius_m.powi(2);
+        assert!((detector.throughput_m2_sr() * 300.0 * 300.0 / areas - 1.0).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_throughput_s_uncertainty_adds_twice_the_relative_ones_of_the_lengths() {
+        let detector = Detector {
+            distance_m: 300.0,
+            u_distance_m: 3.0,
+            u_pupil_radius_m: 0.0,
+            u_spot_radius_m: 0.0,
+            ..detector()
+        };
+        assert!((detector.u_throughput_relative() - 0.02).abs() < 1e-9);
+        let u_pupil_radius_m = 0.01 * detector.pupil_radius_m;
+        let both = Detector { u_pupil_radius_m, ..detector };
+        assert!((both.u_throughput_relative() - 0.02 * 2.0_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn shot_noise_falls_with_the_dwell_and_not_with_the_rate() {
+        let slow = detector();
+        let fast = Detector { adc: Adc { rate_hz: 8000, ..slow.adc }, ..slow.clone() };
+        let dwell = Duration::from_millis(50);
+        let slope = |detector: &Detector, dwell: Duration| {
+            detector.modelled_variance(0, detector.adc.readings_in(dwell), 0.0).per_radiance
+        };
+        assert!((slope(&slow, dwell) / slope(&fast, dwell) - 1.0).abs() < 1e-12);
+        assert!((slope(&slow, dwell) / slope(&slow, 4 * dwell) - 4.0).abs() < 1e-12);
+        // q I / t, in the radiance's unit.
+        let current_a = slow.a_per_radiance();
+        let expected = ELEMENTARY_CHARGE_C * current_a / 0.05 / (current_a * current_a);
+        assert!((slope(&slow, dwell) / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn quantisation_averages_out_only_where_noise_dithers_it() {
+        let of = |read_noise_a: f64, n: u32| {
+            let detector = Detector { read_noise_a, ..detector() };
+            let lsb = detector.lsb_a(0) / detector.a_per_radiance();
+            detector.modelled_variance(0, n, 0.0).floor / (lsb * lsb / 12.0)
+        };
+        assert!((of(0.0, 1) - 1.0).abs() < 1e-12 && (of(0.0, 100) - 1.0).abs() < 1e-12);
+        let lsb_a = detector().lsb_a(0);
+        assert!((of(lsb_a, 1) / of(lsb_a, 100) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_dark_current_s_shot_noise_is_in_the_floor() {
+        let detector = detector();
+        let dark_a = 1e-9;
+        let more = detector.modelled_variance(0, 100, dark_a).floor
+            - detector.modelled_variance(0, 100, 0.0).floor;
+        let slope = detector.modelled_variance(0, 100, 0.0).per_radiance;
+        assert!((more / (slope * dark_a / detector.a_per_radiance()) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn full_scale_is_half_the_codes() {
+        let detector = detector();
+        assert!((detector.adc.full_scale_counts() - 524_288.0).abs() < 1e-9);
+        assert!((detector.lsb_a(0) * 524_288.0 / 1e-6 - 1.0).abs() < 1e-15);
+        assert!(
+            (detector.saturation_radiance(1) * 10.0 / detector.saturation_radiance(0) - 1.0).abs()
+                < 1e-12
+        );
     }
 }

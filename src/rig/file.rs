@@ -6,6 +6,8 @@
 use std::collections::HashSet;
 use std::time::Duration;
 
+use radiometry::quantity::Throughput;
+use radiometry::throughput::CoaxialDisks;
 use spanned_toml::{Bounds, Document, Problem, Source, Table};
 
 use super::axis::{Approach, Axis, Readback};
@@ -215,8 +217,25 @@ fn read_detector(table: Table<'_>) -> Result<Detector, Problem> {
         gains: read_gains(&table)?,
         adc: read_adc(table.required_table("adc")?)?,
     };
+    check_beam(&table, &detector)?;
     table.finish()?;
     Ok(detector)
+}
+
+/// A throughput so small or large that no double holds it has a length in a wrong unit.
+fn check_beam(table: &Table<'_>, detector: &Detector) -> Result<(), Problem> {
+    let disks = detector.disks();
+    let throughput = disks.and_then(CoaxialDisks::throughput).map(Throughput::m2_sr);
+    let has_partials = disks.and_then(CoaxialDisks::partials).is_ok();
+    if has_partials && throughput.is_ok_and(f64::is_normal) {
+        return Ok(());
+    }
+    Err(table.problem(
+        "distance_mm",
+        "distance, pupil and spot make no throughput",
+        "lengths of a beam, in millimetres",
+        "check the units of distance_mm, pupil_diameter_mm and spot_diameter_mm",
+    ))
 }
 
 fn read_quantity(table: &Table<'_>) -> Result<Quantity, Problem> {

@@ -8,6 +8,8 @@ mod axis;
 pub mod calibration;
 mod detector;
 mod file;
+#[cfg(test)]
+mod file_tests;
 mod kinematics;
 mod link;
 mod motion;
@@ -16,7 +18,7 @@ mod reading;
 
 pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
-pub use kinematics::{Route, forward, solutions, wrap};
+pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
 pub use motion::rest_to_rest_s;
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
