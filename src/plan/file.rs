@@ -5,12 +5,13 @@
 
 use std::time::Duration;
 
+use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
     Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, WarmUp,
 };
-use crate::rig::{Pose, wrap};
+use crate::rig::Pose;
 
 /// A sample is smaller than this from its origin.
 const PLACE_MM: Bounds = Bounds::between(-10_000.0, 10_000.0);
@@ -220,7 +221,7 @@ fn read_reference(
         pose.y_m = y_mm / 1e3;
     }
     pose.theta_rad = table.number("theta_deg", THETA_DEG)?.unwrap_or(0.0).to_radians();
-    pose.phi_rad = wrap(table.number("phi_deg", PHI_DEG)?.unwrap_or(0.0).to_radians());
+    pose.phi_rad = wrap_deg(table.number("phi_deg", PHI_DEG)?.unwrap_or(0.0)).to_radians();
     if let Some(every) = table.integer("every", 1..=COUNT_MAX)? {
         reference.every = whole(every);
     }

@@ -1,0 +1,115 @@
+//! plan.toml as people get it wrong.
+
+use std::time::Duration;
+
+use spanned_toml::{Document, Problem, Source};
+
+use super::*;
+
+const FULL: &str = r#"
+name = "luminaire"
+rig = "rig.toml"
+scene = "scene.toml"
+[region]
+x_mm = [-20, 20]
+y_mm = [-10, 20]
+theta_max_deg = 80
+[schedule]
+kind = "raster"
+x_count = 3
+y_count = 2
+theta_step_deg = 5
+phi_step_deg = 7.5
+order = "travel"
+repeat = 2
+[dwell]
+dwell_ms = 50
+gain = "1 uA"
+[dark]
+every = 200
+dwell_ms = 200
+method = "shutter"
+[reference]
+x_mm = 1
+y_mm = 2
+theta_deg = 30
+phi_deg = -180
+every = 100
+dwell_ms = 100
+[warm_up]
+tolerance_relative = 0.002
+over_s = 60
+timeout_s = 1800
+[stop]
+exitance_relative = 0.01
+rig_time_s_max = 3600
+[fit]
+angular_degree = 8
+position_degree = 2
+"#;
+
+fn read(text: &str) -> Result<Plan, Problem> {
+    Plan::read(Document::parse(Source::new("plan.toml", text))?)
+}
+
+#[test]
+fn every_key_is_read_in_si_units() {
+    let plan = read(FULL).unwrap();
+    assert_eq!(plan.name.as_deref(), Some("luminaire"));
+    assert_eq!(
+        (plan.rig.as_deref(), plan.scene.as_deref()),
+        (Some("rig.toml"), Some("scene.toml"))
+    );
+    assert_eq!((plan.region.x_m, plan.region.y_m), ((-0.02, 0.02), (-0.01, 0.02)));
+    assert_eq!(plan.dwell, Duration::from_millis(50));
+    assert_eq!((plan.order, plan.repeat), (Order::Travel, 2));
+    assert_eq!(plan.reference.pose.phi_rad.to_bits(), std::f64::consts::PI.to_bits());
+    assert_eq!(plan.warm_up.unwrap().timeout, Duration::from_mins(30));
+    assert_eq!(plan.stop.rig_time_max, Some(Duration::from_hours(1)));
+    assert_eq!(plan.fit, FitSpec { angular_degree: 8, position_degree: 2 });
+}
+
+#[test]
+fn what_a_plan_leaves_out_has_a_default() {
+    let text = "[region]\nx_mm = [0, 10]\ny_mm = [-4, 4]\ntheta_max_deg = 90\n\
+                [schedule]\nkind = \"low-discrepancy\"\ncount = 10\n\
+                [dwell]\ndwell_ms = 10\n[dark]\nmethod = \"shutter\"\n\
+                [fit]\nangular_degree = 2\nposition_degree = 0\n";
+    let plan = read(text).unwrap();
+    assert_eq!((plan.dark.every, plan.dark.dwell), (200, Duration::from_millis(40)));
+    assert_eq!((plan.reference.every, plan.reference.dwell), (100, Duration::from_millis(20)));
+    assert_eq!((plan.reference.pose.x_m, plan.reference.pose.theta_rad), (0.005, 0.0));
+    assert_eq!((plan.gain, plan.warm_up, plan.stop), (None, None, Stop::default()));
+}
+
+#[test]
+fn every_mistake_is_named_at_its_line() {
+    for (from, to, key) in [
+        ("x_mm = [-20, 20]", "x_mm = [20, -20]", "region.x_mm"),
+        ("y_mm = [-10, 20]", "y_mm = [3, 3]", "region.y_mm"),
+        ("theta_max_deg = 80", "theta_max_deg = 95", "region.theta_max_deg"),
+        ("theta_max_deg = 80", "theta_max_deg = nan", "region.theta_max_deg"),
+        ("x_count = 3", "x_count = 0", "schedule.x_count"),
+        ("theta_step_deg = 5", "theta_step_deg = 0", "schedule.theta_step_deg"),
+        ("phi_step_deg = 7.5", "phi_step_deg = 7", "schedule.phi_step_deg"),
+        ("phi_step_deg = 7.5", "c_step_deg = 7.5", "schedule.phi_step_deg"),
+        ("repeat = 2", "repeat = 2\ncount = 3", "schedule.count"),
+        ("order = \"travel\"", "order = \"random\"", "schedule.order"),
+        ("dwell_ms = 50", "dwell_ms = -50", "dwell.dwell_ms"),
+        ("method = \"shutter\"", "method = \"off\"", "dark.method"),
+        ("every = 200", "every = 0", "dark.every"),
+        ("theta_deg = 30", "theta_deg = 91", "reference.theta_deg"),
+        ("timeout_s = 1800", "timeout_s = 30", "warm_up.timeout_s"),
+        ("exitance_relative", "exitence_relative", "stop.exitence_relative"),
+        ("angular_degree = 8", "angular_degree = 8.5", "fit.angular_degree"),
+        ("scene = \"scene.toml\"", "scenes = \"scene.toml\"", "scenes"),
+        ("name = \"luminaire\"", "name = \"../luminaire\"", "name"),
+        ("[fit]", "[fitting]", "fit"),
+    ] {
+        assert!(FULL.contains(from), "{from}");
+        let problem = read(&FULL.replace(from, to)).unwrap_err();
+        assert_eq!(problem.key(), key, "{problem}");
+        assert!(problem.line_and_column().is_some(), "{problem}");
+        assert!(problem.to_string().contains("expected"), "{problem}");
+    }
+}
