@@ -1,4 +1,14 @@
-//! What a sequence will cost in rig time.
+//! What a sequence will cost in rig time, from the same profile of motion that the device runs.
+//!
+//! The wire costs nothing here: commands queue on the device, behind its motion.
+
+use std::time::Duration;
+
+use super::{Step, Target};
+use crate::rig::{Latched, ReadingKind, Rig};
+
+/// A device looks for its home marks at about this part of its speed.
+const HOMING_SPEED: f64 = 0.25;
 
 /// Rig time, part by part, and the way.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -10,7 +20,8 @@ pub struct Prediction {
     /// How far each axis travels, radians, radians, metres, metres, in the order of
     /// [`crate::rig::AXES`].
     pub travel: [f64; 4],
-    /// Finding the home marks at the start.
+    /// Finding the home marks at the start: an estimate, since nobody knows where the axes stand
+    /// before it. It is the time of one sweep over the longest axis.
     pub homing_s: f64,
     /// Moving, between all readings.
     pub moving_s: f64,
@@ -22,9 +33,108 @@ pub struct Prediction {
     pub checking_s: f64,
 }
 
+/// The rig time of one step, coming from the one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepTime {
+    /// Moving there, by way of [`Step::via`] where there is one.
+    pub moving_s: f64,
+    /// Waiting for the axes to be still.
+    pub settling_s: f64,
+    /// Integrating.
+    pub dwelling_s: f64,
+}
+
+impl StepTime {
+    /// Of a step that begins at `from`.
+    pub fn of(rig: &Rig, from: Latched, step: &Step) -> Self {
+        let route = rig.route(from, step.counts);
+        let moving_s = match route.via {
+            None => rig.move_duration(from, step.counts),
+            Some(via) => rig.move_duration(from, via) + rig.move_duration(via, step.counts),
+        };
+        let adc = rig.detector.adc;
+        Self {
+            moving_s: moving_s.as_secs_f64(),
+            settling_s: route.settle.as_secs_f64(),
+            dwelling_s: f64::from(adc.readings_in(step.dwell)) / f64::from(adc.rate_hz),
+        }
+    }
+
+    /// The whole, seconds.
+    pub fn total_s(&self) -> f64 {
+        self.moving_s + self.settling_s + self.dwelling_s
+    }
+}
+
 impl Prediction {
     /// The whole, seconds, without a warm-up, whose length is the source's to decide.
     pub fn total_s(&self) -> f64 {
         self.homing_s + self.moving_s + self.settling_s + self.dwelling_s + self.checking_s
+    }
+
+    /// Of steps that begin at home.
+    pub(super) fn of(rig: &Rig, targets: &[Target], steps: &[Step]) -> Self {
+        let mut prediction = Self {
+            targets: count(targets.len()),
+            readings: count(steps.len()),
+            homing_s: homing_s(rig),
+            ..Self::default()
+        };
+        let mut here = Latched([0; 4]);
+        for step in steps {
+            let time = StepTime::of(rig, here, step);
+            prediction.moving_s += time.moving_s;
+            prediction.settling_s += time.settling_s;
+            match step.kind {
+                ReadingKind::Target { .. } => prediction.dwelling_s += time.dwelling_s,
+                _ => prediction.checking_s += time.dwelling_s,
+            }
+            prediction.travel(rig, here, step);
+            here = step.counts;
+        }
+        prediction
+    }
+
+    fn travel(&mut self, rig: &Rig, from: Latched, step: &Step) {
+        let via = step.via.unwrap_or(step.counts);
+        for (i, axis) in rig.axes.iter().enumerate() {
+            let leg = |a: i32, b: i32| (f64::from(a) - f64::from(b)).abs();
+            let counts = leg(from.0[i], via.0[i]) + leg(via.0[i], step.counts.0[i]);
+            self.travel[i] += axis.position(counts);
+        }
+    }
+}
+
+fn homing_s(rig: &Rig) -> f64 {
+    let sweep = |axis: &crate::rig::Axis| (axis.travel.1 - axis.travel.0) / axis.speed;
+    rig.axes.iter().map(sweep).fold(0.0, f64::max) / HOMING_SPEED
+}
+
+/// Both counts are bounded when a sequence is laid out.
+fn count(len: usize) -> u32 {
+    u32::try_from(len).unwrap_or(u32::MAX)
+}
+
+/// Rig time of all readings that are still to be taken, for an ETA.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeLeft {
+    /// Seconds from the start of step i to the end of the sequence; one more at the end, 0.
+    from_step_s: Vec<f64>,
+}
+
+impl TimeLeft {
+    /// Of steps that begin at home.
+    pub fn of(rig: &Rig, steps: &[Step]) -> Self {
+        let mut from_step_s = vec![0.0; steps.len() + 1];
+        for (i, step) in steps.iter().enumerate().rev() {
+            let from = if i == 0 { Latched([0; 4]) } else { steps[i - 1].counts };
+            from_step_s[i] = from_step_s[i + 1] + StepTime::of(rig, from, step).total_s();
+        }
+        Self { from_step_s }
+    }
+
+    /// Seconds until the end, at the start of a step; zero after the last.
+    pub fn at(&self, step: usize) -> Duration {
+        Duration::from_secs_f64(self.from_step_s.get(step).copied().unwrap_or_default())
     }
 }

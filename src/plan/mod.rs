@@ -7,10 +7,21 @@
 
 mod cost;
 mod file;
+#[cfg(test)]
+mod file_tests;
+mod grid;
+mod hash;
+mod layout;
+#[cfg(test)]
+mod layout_tests;
+mod list;
+mod order;
 mod sequence;
 mod terms;
+mod tree;
 
-pub use cost::Prediction;
+pub use cost::{Prediction, StepTime, TimeLeft};
+pub use hash::PlanHash;
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Target, WARM_UP_IDS_FROM};
 pub use terms::{
     Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, WarmUp,
@@ -18,3 +29,7 @@ pub use terms::{
 
 /// The most targets that a plan may have. At a second each they take twelve days.
 pub const TARGETS_MAX: u32 = 1_000_000;
+/// The most readings of all kinds that a plan may make, its repeats included.
+pub const READINGS_MAX: u32 = 2_000_000;
+/// The largest list of poses worth reading, in bytes: some hundred bytes a pose.
+pub const LIST_BYTES_MAX: u64 = 100 << 20;

@@ -63,4 +63,19 @@ pub struct Sequence {
     pub steps: Vec<Step>,
     /// What they cost.
     pub prediction: Prediction,
+    pub(super) reference: Step,
+}
+
+impl Sequence {
+    /// The n-th reading while the source warms up: at the reference pose, outside the sequence.
+    pub fn warm_up(&self, n: u32) -> Step {
+        let id = WARM_UP_IDS_FROM.saturating_add(n).min(RESUME_IDS_FROM - 1);
+        Step { id, kind: ReadingKind::WarmUp, ..self.reference }
+    }
+
+    /// The n-th reading of the reference pose that resumes have taken in this run to see whether
+    /// they may go on.
+    pub fn resume_check(&self, n: u32) -> Step {
+        Step { id: RESUME_IDS_FROM.saturating_add(n), ..self.reference }
+    }
 }
