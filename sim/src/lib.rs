@@ -18,8 +18,10 @@ mod nominal;
 mod pty;
 mod rows;
 mod scene;
+mod serve;
 mod simulated;
 mod truth;
+mod wire;
 
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
@@ -30,5 +32,7 @@ pub use pty::Pty;
 pub use scene::{
     EXPONENT_MAX, Emitter, Law, Load, Scene, SceneError, Shape, Tabulated, TabulatedError,
 };
+pub use serve::serve;
 pub use simulated::{LinkFaults, Simulated};
 pub use truth::{Peak, Region, Truth};
+pub use wire::Wire;
