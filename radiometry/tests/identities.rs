@@ -300,7 +300,7 @@ proptest! {
     #[test]
     fn wrapped_angles_differ_by_whole_turns(angle in -1e6..1e6f64) {
         let wrapped = direction::wrap(angle);
-        prop_assert!(-PI <= wrapped && wrapped <= PI);
+        prop_assert!((-PI..=PI).contains(&wrapped));
         prop_assert!((wrapped.sin() - angle.sin()).abs() < 1e-15 * 4.0);
         let degrees = direction::wrap_deg(angle);
         prop_assert!(-180.0 < degrees && degrees <= 180.0);
