@@ -110,6 +110,7 @@ impl<B: Board> DeviceCore<B> {
     /// How the device is.
     pub fn status(&mut self, now: Instant) -> Status {
         self.catch_up(now);
+        self.axes.follow(self.clock, &mut self.board);
         Status {
             boot_id: self.board.boot_id(),
             homed: self.axes.homed(),
@@ -225,7 +226,9 @@ impl<B: Board> DeviceCore<B> {
             self.happen();
         }
         self.clock = now;
-        self.axes.follow(now, &mut self.board);
+        if !self.board.answers_late() {
+            self.axes.follow(now, &mut self.board);
+        }
         self.ask_board();
     }
 
