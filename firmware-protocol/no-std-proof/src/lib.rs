@@ -1,12 +1,10 @@
-//! A device core over a board that does nothing, linked without std and without an allocator, as
+//! A whole device over a board that does nothing, linked without std and without an allocator, as
 //! a microcontroller would. It only has to build.
 #![no_std]
 
 use core::panic::PanicInfo;
 
-use firmware_protocol::{
-    AxisIdentity, Board, BoardFault, DeviceCore, Illumination, Instant, Reply, Request,
-};
+use firmware_protocol::{AxisIdentity, Board, BoardFault, Device, Illumination, Instant, frame};
 
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
@@ -62,17 +60,16 @@ impl Board for Bare {
     }
 }
 
-/// What a firmware's main loop calls, so that the linker needs all of the core.
+/// What a firmware's main loop does, so that the link and the core are compiled for this
+/// board.
 #[unsafe(no_mangle)]
-pub extern "C" fn device_after_us(us: u64) -> u64 {
+pub extern "C" fn frame_length_after_us(us: u64) -> usize {
     let axes = [AxisIdentity { low: 0, high: 1, speed: 1, acceleration: 1 }];
-    let mut core = DeviceCore::new(Bare { axes, counts: 0.0 });
+    let mut device = Device::new(Bare { axes, counts: 0.0 });
     let now = Instant::from_micros(us);
-    let said = match core.handle_request(now, &Request::Identify(1)) {
-        Reply::Identity(identity) => u64::from(identity.boot_id),
-        _ => 0,
-    };
-    core.handle_timeout(now);
-    while core.poll_event().is_some() {}
-    core.poll_timeout().map_or(said, Instant::micros)
+    let mut wire = [0; frame::WIRE_MAX];
+    device.handle_bytes(now, &wire);
+    device.handle_timeout(now);
+    let length = device.poll_transmit(now, &mut wire);
+    device.poll_timeout().and(length).unwrap_or(0)
 }
