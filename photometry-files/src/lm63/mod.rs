@@ -7,9 +7,10 @@
 //!
 //! # Directions
 //! γ is counted from the photometric zero, the luminaire's downward vertical; C counter-clockwise
-//! about the vertical *as seen from above*, from the photometric horizontal C = 0. Whoever looks
-//! along the emission (from the luminaire into its light) thus sees C turn counter-clockwise from
-//! behind; in a frame whose +z is the emission, C = -φ modulo 360° where +x is C = 0.
+//! about the vertical *as seen from above*, from the photometric horizontal C = 0. Seen from above
+//! is seen along the emission. In a frame whose +z is the emission, φ from +x towards +y turns
+//! clockwise for who looks along +z; so C = -φ modulo 360°, if +x is C = 0. Nothing here applies
+//! that: directions stay (C, γ).
 //!
 //! # Dimensions
 //! The opening's *length* lies along C0-C180 and its *width* along C90-C270, although the file gives
