@@ -71,7 +71,7 @@ fn check_noise(index: usize, noise: Noise) -> Result<(), FitError> {
         return Err(FitError::Variance { index, what, value });
     }
     if slope < 0.0 {
-        return Err(FitError::Variance { index, what: "variance per radiance", value: slope });
+        return Err(FitError::ShotNoise { index, value: slope });
     }
     Ok(())
 }

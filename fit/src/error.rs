@@ -34,6 +34,13 @@ pub enum FitError {
         /// As handed in.
         value: f64,
     },
+    /// Shot noise that falls as the level rises, which there isn't.
+    ShotNoise {
+        /// The sample.
+        index: usize,
+        /// Variance per radiance as handed in.
+        value: f64,
+    },
     /// A direction below the sample's plane, which the surface chart doesn't have.
     Theta {
         /// The sample.
@@ -104,6 +111,9 @@ impl fmt::Display for FitError {
             Self::NotFinite { index, what } => write!(f, "sample {index}: {what} is not finite"),
             Self::Variance { index, what, value } => {
                 write!(f, "sample {index}: {what} {value:e}, expected more than 0")
+            }
+            Self::ShotNoise { index, value } => {
+                write!(f, "sample {index}: variance per radiance {value:e}, expected 0 or more")
             }
             Self::Theta { index, theta_rad } => {
                 let theta_deg = theta_rad.to_degrees();

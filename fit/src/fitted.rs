@@ -5,6 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::{BasisSpec, FitError, Ray, Region};
 use radiometry::DomainError;
+use std::f64::consts::FRAC_PI_2;
 
 /// A value with its combined standard uncertainty (k = 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,6 +108,11 @@ impl Fit {
         self.estimate(&self.radiance_functional(ray))
     }
 
+    /// The radiance along a ray without its uncertainty: for maps and comparisons of many rays.
+    pub fn value(&self, ray: &Ray) -> f64 {
+        self.basis.value(&self.parts.coefficients, ray, &mut self.basis.scratch())
+    }
+
     /// The exitance M = ∫ L cos θ dω over the whole hemisphere, mean over the region, in the
     /// values' unit times sr: c₀ √π. Beyond what was measured it is extrapolated.
     pub fn exitance(&self) -> Estimate {
@@ -114,8 +120,16 @@ impl Fit {
     }
 
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
+    /// An angle outside [0, π/2] is refused.
     pub fn exitance_within(&self, theta_max_rad: f64) -> Result<Estimate, DomainError> {
         Ok(self.estimate(&self.basis.exitance_within(theta_max_rad)?))
+    }
+
+    /// The exitance within the region's own cone, mean over the region: what rests on measurement.
+    pub fn exitance_within_region(&self) -> Estimate {
+        let theta_max_rad = self.region().theta_max_rad.min(FRAC_PI_2);
+        let functional = self.basis.exitance_within(theta_max_rad);
+        self.estimate(&functional.unwrap_or_else(|_| self.basis.exitance()))
     }
 
     /// The flux that leaves the region: exitance times its area, in the values' unit times m² sr.
@@ -133,9 +147,8 @@ impl Fit {
     /// The exitance within the region's cone over that of the hemisphere: how much of the latter
     /// rests on measurement. `None` where the exitance isn't positive.
     pub fn measured_fraction(&self) -> Option<f64> {
-        let within = self.exitance_within(self.region().theta_max_rad).ok()?.value;
         let whole = self.exitance().value;
-        (whole > 0.0).then(|| within / whole)
+        (whole > 0.0).then(|| self.exitance_within_region().value / whole)
     }
 
     /// The exitance's uncertainty by source, the independent part first.

@@ -18,9 +18,10 @@ pub struct Triangle {
     unknowns: usize,
     sides: usize,
     rows: u64,
-    /// R on top, below it the rows that wait for the next factorisation.
+    /// R on top, zeros below its diagonal; room for a block of rows under it.
     work: Mat<f64>,
-    waiting: usize,
+    /// The rows that wait for the next factorisation, one after the other.
+    waiting: Vec<f64>,
 }
 
 impl Triangle {
@@ -29,7 +30,8 @@ impl Triangle {
         let columns = unknowns + sides;
         let block = (BLOCK_ROWS_PER_COLUMN * columns).max(BLOCK_ROWS_MIN);
         let work = Mat::zeros(columns + block, columns);
-        Self { unknowns, sides, rows: 0, work, waiting: 0 }
+        let waiting = Vec::with_capacity(block * columns);
+        Self { unknowns, sides, rows: 0, work, waiting }
     }
 
     /// Takes in one row: `unknowns` numbers, then one for each right-hand side, all already
@@ -39,13 +41,9 @@ impl Triangle {
     /// When the row's length is not that of the triangle's columns.
     pub fn absorb(&mut self, row: &[f64]) {
         assert_eq!(row.len(), self.columns(), "a row has as many numbers as there are columns");
-        let at = self.columns() + self.waiting;
-        for (j, value) in row.iter().enumerate() {
-            self.work[(at, j)] = *value;
-        }
-        self.waiting += 1;
+        self.waiting.extend_from_slice(row);
         self.rows += 1;
-        if at + 1 == self.work.nrows() {
+        if self.waiting.len() == (self.work.nrows() - self.columns()) * self.columns() {
             self.factor();
         }
     }
@@ -98,28 +96,31 @@ impl Triangle {
 
     /// Factors [R; waiting rows] and keeps the upper triangle.
     fn factor(&mut self) {
-        if self.waiting == 0 {
+        let columns = self.columns();
+        if self.waiting.is_empty() {
             return;
         }
-        let columns = self.columns();
-        let rows = columns + self.waiting;
-        let size = factor::recommended_block_size::<f64>(rows, columns);
+        let rows = columns + self.waiting.len() / columns;
+        for j in 0..columns {
+            let below = self.work.col_as_slice_mut(j)[columns..rows].iter_mut();
+            for (to, row) in below.zip(self.waiting.chunks_exact(columns)) {
+                *to = row[j];
+            }
+        }
+        self.waiting.clear();
+        let block = factor::recommended_block_size::<f64>(rows, columns);
         let scratch =
-            factor::qr_in_place_scratch::<f64>(rows, columns, size, Par::Seq, Spec::default());
-        let mut householder = Mat::zeros(size, columns);
+            factor::qr_in_place_scratch::<f64>(rows, columns, block, Par::Seq, Spec::default());
         factor::qr_in_place(
             self.work.as_mut().get_mut(..rows, ..),
-            householder.as_mut(),
+            Mat::zeros(block, columns).as_mut(),
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
             Spec::default(),
         );
         for j in 0..columns {
-            for i in j + 1..rows {
-                self.work[(i, j)] = 0.0;
-            }
+            self.work.col_as_slice_mut(j)[j + 1..rows].fill(0.0);
         }
-        self.waiting = 0;
     }
 }
 
@@ -231,3 +232,139 @@ const BLOCK_ROWS_MIN: usize = 64;
 /// A combination is determined when its singular value is above this share of the largest one.
 /// The factorisation itself takes a column for dependent below about 1e-11 of its length.
 const RANK_TOLERANCE: f64 = 1e-10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look random, in [-1, 1).
+    fn numbers(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 * 2f64.powi(-52) - 1.0
+        }
+    }
+
+    /// Rows whose two right-hand sides are 1, 2, .. times the columns, the first with noise.
+    fn rows(count: usize, unknowns: usize) -> Vec<Vec<f64>> {
+        let mut next = numbers(7);
+        let row = |_| {
+            let mut row: Vec<f64> = (0..unknowns).map(|_| next()).collect();
+            let exact: f64 = row.iter().enumerate().map(|(j, a)| (j + 1) as f64 * a).sum();
+            row.push(exact + 0.1 * next());
+            row.push(exact);
+            row
+        };
+        (0..count).map(row).collect()
+    }
+
+    fn of(rows: &[Vec<f64>], unknowns: usize) -> Triangle {
+        let mut triangle = Triangle::new(unknowns, rows[0].len() - unknowns);
+        for row in rows {
+            triangle.absorb(row);
+        }
+        triangle
+    }
+
+    fn assert_close(a: &[f64], b: &[f64], tolerance: f64) {
+        let largest = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(a.len() == b.len() && largest < tolerance, "differ by {largest:e}");
+    }
+
+    #[test]
+    fn an_exact_side_is_solved_exactly_and_a_noisy_one_leaves_its_residual() {
+        let rows = rows(3000, 12);
+        let solution = of(&rows, 12).solve().unwrap();
+        let expected: Vec<f64> = (1..=12).map(f64::from).collect();
+        assert_close(&solution.unknowns(1), &expected, 1e-12);
+        assert!(solution.residual_squares(1).sqrt() < 1e-10);
+        let found = solution.unknowns(0);
+        let residual = |row: &Vec<f64>| {
+            row[12] - row[..12].iter().zip(&found).map(|(a, c)| a * c).sum::<f64>()
+        };
+        let squares: f64 = rows.iter().map(|row| residual(row).powi(2)).sum();
+        assert!((solution.residual_squares(0) / squares - 1.0).abs() < 1e-12);
+        // The residual is orthogonal to every column.
+        for j in 0..12 {
+            let product: f64 = rows.iter().map(|row| residual(row) * row[j]).sum();
+            assert!(product.abs() < 1e-10, "column {j}: {product:e}");
+        }
+    }
+
+    #[test]
+    fn blocks_and_merged_parts_equal_the_whole() {
+        let rows = rows(2500, 9);
+        let whole = of(&rows, 9).solve().unwrap();
+        let mut merged = of(&rows[1700..], 9);
+        merged.merge(&of(&rows[..4], 9)); // fewer rows than unknowns
+        merged.merge(&Triangle::new(9, 2));
+        merged.merge(&of(&rows[4..1700], 9));
+        assert_eq!(merged.rows(), 2500);
+        let merged = merged.solve().unwrap();
+        for side in 0..2 {
+            assert_close(&merged.unknowns(side), &whole.unknowns(side), 1e-12);
+        }
+        assert!((merged.residual_squares(0) / whole.residual_squares(0) - 1.0).abs() < 1e-12);
+        let (a, b) = (merged.spectrum().unwrap(), whole.spectrum().unwrap());
+        assert!((a.condition() / b.condition() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_inverse_is_a_factor_of_the_covariance() {
+        let rows = rows(200, 5);
+        let solution = of(&rows, 5).solve().unwrap();
+        let inverse = solution.inverse();
+        let s = |i: usize, j: usize| if i <= j { inverse[j * (j + 1) / 2 + i] } else { 0.0 };
+        // (AᵀA) S Sᵀ = 1.
+        for i in 0..5 {
+            for k in 0..5 {
+                let gram = |l: usize| rows.iter().map(|row| row[i] * row[l]).sum::<f64>();
+                let covariance = |l: usize| (0..5).map(|j| s(l, j) * s(k, j)).sum::<f64>();
+                let product: f64 = (0..5).map(|l| gram(l) * covariance(l)).sum();
+                assert!((product - f64::from(u8::from(i == k))).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn dependent_and_empty_columns_lower_the_rank_wherever_they_stand() {
+        for (copy_to, empty) in [(5, 0), (0, 3), (2, 5)] {
+            let mut rows = rows(400, 6);
+            for row in &mut rows {
+                row[copy_to] = row[1] - 2.0 * row[4];
+                row[empty] = 0.0;
+            }
+            let spectrum = of(&rows, 6).solve().unwrap().spectrum().unwrap();
+            assert_eq!(spectrum.rank(), 4);
+            let shares = spectrum.undetermined_shares();
+            assert!((shares[empty] - 1.0).abs() < 1e-12);
+            assert!([1, 4, copy_to].iter().all(|k| shares[*k] > 0.05), "{shares:?}");
+            assert!((shares.iter().sum::<f64>() - 2.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_length_of_a_column_changes_neither_condition_nor_rank() {
+        let plain = rows(300, 6);
+        let mut stretched = plain.clone();
+        for row in &mut stretched {
+            for (j, value) in row[..6].iter_mut().enumerate() {
+                *value *= [1e-20, 1e-9, 1e-3, 1.0, 1e7, 1e20][j];
+            }
+        }
+        let (a, b) = (of(&plain, 6).solve().unwrap(), of(&stretched, 6).solve().unwrap());
+        let condition = a.spectrum().unwrap().condition();
+        assert!((b.spectrum().unwrap().condition() / condition - 1.0).abs() < 1e-9);
+        assert!((a.residual_squares(0) / b.residual_squares(0) - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_no_solution() {
+        let mut rows = rows(30, 3);
+        rows[7][1] = f64::INFINITY;
+        assert!(of(&rows, 3).solve().is_none());
+    }
+}

@@ -1,0 +1,184 @@
+//! Input that can't be fitted is refused with a sentence that says what is missing.
+
+#[allow(dead_code)]
+mod scenes;
+
+use fit::{BasisSpec, Common, FitError, Noise, Ray, Region, Sample, Shift};
+use scenes::{REGION, exact, raster_rays, spread_rays};
+
+const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 2 };
+
+fn refusal(samples: &[Sample], region: &Region, basis: BasisSpec) -> String {
+    fit::fit(samples, region, basis, &[]).unwrap_err().to_string()
+}
+
+fn says(text: &str, part: &str) {
+    assert!(text.contains(part), "`{text}` doesn't say `{part}`");
+}
+
+fn good() -> Vec<Sample> {
+    exact(&spread_rays(300, &REGION, 1), |_| 1.0)
+}
+
+fn refused_with(change: impl Fn(&mut Sample)) -> String {
+    let mut samples = good();
+    change(&mut samples[17]);
+    refusal(&samples, &REGION, BASIS)
+}
+
+/// Refits after moving every ray.
+fn refused_rays(change: impl Fn(&mut Ray)) -> String {
+    let mut rays = spread_rays(400, &REGION, 2);
+    rays.iter_mut().for_each(change);
+    refusal(&exact(&rays, |_| 1.0), &REGION, BASIS)
+}
+
+#[test]
+fn numbers_without_sense_are_named_by_their_sample() {
+    assert_eq!(refusal(&[], &REGION, BASIS), "no samples: there is nothing to fit");
+    assert_eq!(refused_with(|s| s.value = f64::NAN), "sample 17: value is not finite");
+    assert_eq!(refused_with(|s| s.ray.phi_rad = f64::INFINITY), "sample 17: phi is not finite");
+    assert_eq!(
+        refused_with(|s| s.noise = Noise::Fixed { variance: 0.0 }),
+        "sample 17: variance 0e0, expected more than 0"
+    );
+    assert_eq!(
+        refused_with(|s| s.noise = Noise::Modelled { floor: 1.0, per_radiance: -2.0 }),
+        "sample 17: variance per radiance -2e0, expected 0 or more"
+    );
+    assert_eq!(
+        refused_with(|s| s.ray.theta_rad = 1.6),
+        "sample 17: theta 91.673° is outside 0° to 90°"
+    );
+    let off = refused_with(|s| (s.ray.x_m, s.ray.y_m) = (0.021, 0.012));
+    assert_eq!(off, "sample 17: (21.000, 12.000) mm lies outside the region");
+    let reversed = Region { x_m: (0.02, -0.02), ..REGION };
+    says(&refusal(&good(), &reversed, BASIS), "ends must be finite and in order");
+}
+
+#[test]
+fn a_readback_a_little_off_the_region_is_taken() {
+    let mut samples = good();
+    samples[3].ray.x_m = 0.0203;
+    assert!(fit::fit(&samples, &REGION, BASIS, &[]).is_ok());
+}
+
+#[test]
+fn too_few_readings_are_counted() {
+    let samples = exact(&spread_rays(89, &REGION, 1), |_| 1.0);
+    assert_eq!(refusal(&samples, &REGION, BASIS), "89 readings are fewer than the 90 coefficients");
+    let mut samples = exact(&spread_rays(90, &REGION, 1), |_| 1.0);
+    assert!(fit::fit(&samples, &REGION, BASIS, &[]).is_ok());
+    for sample in &mut samples {
+        sample.noise = Noise::Unknown;
+    }
+    says(&refusal(&samples, &REGION, BASIS), "90 readings of unknown noise");
+    let vast = BasisSpec { angular_degree: 1000, position_degree: usize::MAX };
+    says(&refusal(&samples, &REGION, vast), "are more than 4096");
+}
+
+#[test]
+fn one_azimuth_line_is_named_with_both_its_sides() {
+    let text =
+        refused_rays(|ray| ray.phi_rad = if ray.phi_rad < 0.0 { -2.5 } else { 0.641_592_653_6 });
+    says(&text, "all readings lie on one azimuth line (phi = 36.8°)");
+    says(&text, "Z(");
+}
+
+#[test]
+fn too_few_azimuths_and_polar_angles_are_counted() {
+    let text = refused_rays(|ray| ray.phi_rad = (ray.phi_rad * 2.0).round() * 0.5 % 1.0);
+    says(&text, "distinct azimuth lines (phi and phi + 180° count as one): degree 4 needs 5");
+    let text = refused_rays(|ray| ray.theta_rad = if ray.theta_rad < 0.8 { 0.3 } else { 1.2 });
+    says(&text, "only 2 distinct angles theta: degree 4 needs 3");
+}
+
+#[test]
+fn too_few_positions_are_counted_by_axis() {
+    let text = refused_rays(|ray| ray.x_m = if ray.x_m < 0.0 { -0.01 } else { 0.01 });
+    says(&text, "only 2 distinct positions in x: degree 2 needs 3");
+    assert!(!text.contains("in y"), "{text}");
+    says(&text, "P2(x)");
+    let text = refused_rays(|ray| ray.y_m = 0.015 + 0.5 * ray.x_m);
+    says(&text, "the positions (x, y) determine 3 of 6 position terms");
+}
+
+#[test]
+fn all_readings_at_one_pose_miss_everything() {
+    let text = refused_rays(|ray| {
+        *ray = Ray { x_m: 0.01, y_m: 0.01, theta_rad: 0.2, phi_rad: 1.0 };
+    });
+    says(&text, "1 of 90 coefficients are determined");
+    says(&text, "only 1 distinct position in x");
+    says(&text, "only 1 distinct position in y");
+    says(&text, "one azimuth line");
+    says(&text, "only 1 distinct angle theta");
+    says(&text, "nothing was measured beyond 11.5°");
+}
+
+#[test]
+fn a_narrow_cone_is_named_when_it_is_too_narrow() {
+    let text = refused_rays(|ray| ray.theta_rad *= 0.002);
+    says(&text, "nothing was measured beyond 0.2°");
+}
+
+#[test]
+fn position_and_direction_must_vary_independently() {
+    // Nine positions, one direction each, over and over.
+    let text = {
+        let mut rays = raster_rays(&REGION, 12, 12, 4);
+        for ray in &mut rays {
+            ray.theta_rad = 1.0 + 20.0 * ray.x_m;
+            ray.phi_rad = 300.0 * ray.y_m;
+        }
+        refusal(
+            &exact(&rays, |_| 1.0),
+            &REGION,
+            BasisSpec { angular_degree: 1, position_degree: 2 },
+        )
+    };
+    says(&text, "position and direction were not varied independently");
+}
+
+#[test]
+fn a_point_region_is_fitted_without_position_terms() {
+    let region = Region { x_m: (0.01, 0.01), y_m: (0.0, 0.0), ..REGION };
+    let mut rays = spread_rays(100, &REGION, 3);
+    for ray in &mut rays {
+        (ray.x_m, ray.y_m) = (0.010_02, 0.0);
+    }
+    let samples = exact(&rays, |_| 2.0);
+    let basis = BasisSpec { angular_degree: 4, position_degree: 0 };
+    let field = fit::fit(&samples, &region, basis, &[]).unwrap();
+    assert!((field.exitance().value - 2.0 * std::f64::consts::PI).abs() < 1e-12);
+    says(&refusal(&samples, &region, BASIS), "only 1 distinct position in x");
+}
+
+#[test]
+fn a_common_component_without_sense_is_named() {
+    let refused = |u, shift| {
+        let common = Common { name: "arm zero".into(), u, shift };
+        fit::fit(&good(), &REGION, BASIS, &[common]).unwrap_err()
+    };
+    let expected = FitError::Common { name: "arm zero".into() };
+    assert_eq!(refused(f64::NAN, Shift::Scale), expected);
+    assert_eq!(refused(-1.0, Shift::Offset), expected);
+    assert_eq!(refused(1.0, Shift::Value(Box::new(|_, _| f64::NAN))), expected);
+}
+
+#[test]
+fn numbers_beyond_the_range_of_doubles_are_refused() {
+    let samples = exact(&spread_rays(300, &REGION, 4), |_| 1e300);
+    assert_eq!(fit::fit(&samples, &REGION, BASIS, &[]).unwrap_err(), FitError::OutOfRange);
+}
+
+#[test]
+fn a_dark_field_of_zeros_is_a_fit_like_any_other() {
+    let mut samples = exact(&spread_rays(300, &REGION, 5), |_| 0.0);
+    for sample in &mut samples {
+        sample.noise = Noise::Unknown;
+    }
+    let field = fit::fit(&samples, &REGION, BASIS, &[]).unwrap();
+    assert!(field.exitance().value.abs() < 1e-12);
+    assert_eq!(field.measured_fraction(), None);
+}
