@@ -10,9 +10,11 @@ use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
 use crate::{BasisSpec, Common, FitError, Noise, Region, Sample, Shift};
 
-/// Fits the field to samples. See the crate's description for the method.
+/// Fits the field to samples: the crate's description has the method and an example.
 ///
-/// The result depends on the samples' order by rounding alone.
+/// Positions may lie off the region by 2 % of its half width, as readbacks do, and directions
+/// beyond its cone. The result depends on the samples' order by rounding alone. Costs about five
+/// passes of 2 n p² operations for n samples and p coefficients, and memory of 16 p² numbers.
 pub fn fit(
     samples: &[Sample],
     region: &Region,

@@ -5,6 +5,20 @@
 //! Computations, §6.5.3 and §5.2.2 for the factorisation; Demmel et al. 2012, "Communication-optimal
 //! parallel and sequential QR and LU", for the tree of such steps). The order in which rows come
 //! changes R by rounding alone.
+//!
+//! ```
+//! use fit::triangle::Triangle;
+//!
+//! // 1 + 2 t at t = 0, 1, 2, with 0.1, -0.2, 0.1 on top, which no line follows.
+//! let mut triangle = Triangle::new(2, 1);
+//! for row in [[1.0, 0.0, 1.1], [1.0, 1.0, 2.8], [1.0, 2.0, 5.1]] {
+//!     triangle.absorb(&row);
+//! }
+//! let solution = triangle.solve().expect("finite numbers");
+//! let line = solution.unknowns(0);
+//! assert!((line[0] - 1.0).abs() < 1e-14 && (line[1] - 2.0).abs() < 1e-14);
+//! assert!((solution.residual_squares(0) - 0.06).abs() < 1e-14);
+//! ```
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor;
