@@ -2,16 +2,27 @@
 //! where a simulated rig is put together; after it there are types.
 
 mod args;
+mod explain;
 mod failure;
 mod inputs;
 mod nominal;
+mod plan;
+mod setup;
+mod text;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::Parser as _;
+
+use args::{Cli, Command};
+use failure::Failure;
 
 /// Parses the process's arguments and does what they ask.
 pub fn main() -> ExitCode {
-    let _cli = args::Cli::parse();
-    ExitCode::SUCCESS
+    let outcome = match Cli::parse().command {
+        Command::Explain(args) => explain::explain(&args),
+        Command::Plan(args) => plan::plan(&args),
+        _ => Err(Failure::start("not in this build")),
+    };
+    outcome.unwrap_or_else(|failure| failure.report())
 }

@@ -1,0 +1,75 @@
+//! `gonio plan`: what a plan means on its rig, and what it costs. Moves nothing.
+
+use std::process::ExitCode;
+
+use serde_json::json;
+
+use super::args::PlanArgs;
+use super::failure::Outcome;
+use super::setup::Setup;
+use super::text::{duration, table};
+use crate::plan::Prediction;
+use crate::rig::AXES;
+
+/// Checks a plan and prints its prediction.
+pub(crate) fn plan(args: &PlanArgs) -> Outcome {
+    let setup = Setup::from_disk(&args.plan, &args.rig)?;
+    let prediction = &setup.sequence.prediction;
+    if args.json {
+        println!("{}", as_json(&setup, prediction));
+    } else {
+        print!("{}", as_text(&setup, prediction));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn as_text(setup: &Setup, prediction: &Prediction) -> String {
+    let simulated = if setup.rig.is_simulated() { " (simulated)" } else { "" };
+    let mut rows = vec![
+        row("plan", format!("{} ({})", setup.plan_name, setup.plan_hash)),
+        row("rig", format!("{}{simulated}", setup.rig.name)),
+        row("targets", prediction.targets.to_string()),
+        row("readings", prediction.readings.to_string()),
+    ];
+    for (axis, travel) in AXES.iter().zip(prediction.travel) {
+        rows.push(row(&format!("travel {}", axis.name()), axis.in_file_unit(travel)));
+    }
+    let parts = [
+        ("homing", prediction.homing_s),
+        ("moving", prediction.moving_s),
+        ("settling", prediction.settling_s),
+        ("dwelling", prediction.dwelling_s),
+        ("dark and reference", prediction.checking_s),
+        ("rig time", prediction.total_s()),
+    ];
+    rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
+    table(&rows)
+}
+
+fn row(name: &str, value: String) -> Vec<String> {
+    vec![name.to_owned(), value]
+}
+
+fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
+    let [theta, phi, x, y] = prediction.travel;
+    json!({
+        "plan": setup.plan_name,
+        "plan_hash": setup.plan_hash.to_string(),
+        "rig": setup.rig.name,
+        "simulated": setup.rig.is_simulated(),
+        "targets": prediction.targets,
+        "readings": prediction.readings,
+        "travel": {
+            "theta_deg": theta.to_degrees(), "phi_deg": phi.to_degrees(),
+            "x_mm": x * 1e3, "y_mm": y * 1e3,
+        },
+        "time_s": {
+            "homing": prediction.homing_s,
+            "moving": prediction.moving_s,
+            "settling": prediction.settling_s,
+            "dwelling": prediction.dwelling_s,
+            "dark_and_reference": prediction.checking_s,
+            "total": prediction.total_s(),
+        },
+    })
+}

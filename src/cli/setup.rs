@@ -1,0 +1,216 @@
+//! What a run is made of, put together from its files: the plan, the rig, the sequence of
+//! readings, and for a simulated rig the compiled scene. Everything that can be wrong with the
+//! input is found here, before anything moves.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use spanned_toml::{Document, Source};
+
+use super::args::RigArgs;
+use super::failure::Failure;
+use super::inputs::{BUILT_IN, Inputs, beside};
+use super::nominal::nominal;
+use crate::journal::{Input, InputRole};
+use crate::plan::{Plan, PlanHash, Region, Sequence};
+use crate::rig::Rig;
+
+/// The simulated rig, compiled from its scene.
+#[derive(Debug, Clone)]
+pub(crate) struct Stage {
+    pub(crate) compiled: Arc<sim::Compiled>,
+    pub(crate) faults: sim::LinkFaults,
+    pub(crate) seed: u64,
+}
+
+/// All that a run is made of.
+#[derive(Debug, Clone)]
+pub(crate) struct Setup {
+    pub(crate) plan: Plan,
+    pub(crate) plan_name: String,
+    pub(crate) plan_hash: PlanHash,
+    pub(crate) rig: Rig,
+    pub(crate) sequence: Sequence,
+    /// The text of the plan's list of poses, if it has one.
+    pub(crate) list: Option<Source>,
+    /// `None` for a real rig.
+    pub(crate) stage: Option<Stage>,
+    pub(crate) seed: u64,
+    /// The files, byte for byte.
+    pub(crate) inputs: Vec<Input>,
+}
+
+/// Which files, beyond what the plan names.
+#[derive(Debug, Clone, Default)]
+struct Choice {
+    rig: Option<PathBuf>,
+    scene: Option<PathBuf>,
+}
+
+impl Setup {
+    /// From the files on the disk.
+    pub(crate) fn from_disk(plan: &Path, args: &RigArgs) -> Result<Self, Failure> {
+        let choice = Choice { rig: args.rig.clone(), scene: args.scene.clone() };
+        Self::build(Inputs::from_disk(), plan, &choice, None, args.seed)
+    }
+
+    /// From what was read before: a journal's inputs, or a client's. `plan_name` is what the run
+    /// was called then.
+    pub(crate) fn from_inputs(
+        inputs: Vec<Input>,
+        plan_name: Option<String>,
+        seed: u64,
+    ) -> Result<Self, Failure> {
+        let choice = Choice::default();
+        Self::build(Inputs::from_memory(inputs), Path::new("plan.toml"), &choice, plan_name, seed)
+    }
+
+    /// The same rig and scene under another plan: a rung of a ladder.
+    pub(crate) fn with_plan(&self, plan: Plan, seed: u64) -> Result<Self, Failure> {
+        let sequence = plan.lay_out(&self.rig, self.list.as_ref())?;
+        let plan_hash = plan.hash(&sequence);
+        let stage =
+            self.stage.as_ref().map(|stage| stage.with_seed(&self.rig, seed)).transpose()?;
+        Ok(Self { plan, plan_hash, sequence, stage, seed, ..self.clone() })
+    }
+
+    fn build(
+        mut inputs: Inputs,
+        plan_path: &Path,
+        choice: &Choice,
+        plan_name: Option<String>,
+        seed: u64,
+    ) -> Result<Self, Failure> {
+        let plan = Plan::read(inputs.document(InputRole::Plan, plan_path)?)?;
+        let plan_name = plan.name.clone().or(plan_name).unwrap_or_else(|| folder_name(plan_path));
+        let rig = read_rig(&mut inputs, plan_path, &plan, choice)?;
+        let list = match plan.list_file() {
+            None => None,
+            Some(name) => {
+                let bytes = inputs.attachment(plan_path, name).map_err(Failure::start)?;
+                let text = String::from_utf8(bytes).map_err(|_| {
+                    Failure::start(format!("{name}: is not text; expected a CSV of poses in UTF-8"))
+                })?;
+                Some(Source::new(name, &text))
+            }
+        };
+        let sequence = plan.lay_out(&rig, list.as_ref())?;
+        let plan_hash = plan.hash(&sequence);
+        let stage = read_stage(&mut inputs, plan_path, &plan, choice, &rig, seed)?;
+        let inputs = inputs.read().to_vec();
+        Ok(Self { plan, plan_name, plan_hash, rig, sequence, list, stage, seed, inputs })
+    }
+
+    /// The fit's region.
+    pub(crate) fn region(&self) -> Region {
+        self.plan.region
+    }
+
+    /// What is true, on a simulated rig.
+    pub(crate) fn truth(&self) -> Option<sim::Truth<'_>> {
+        let region = self.region();
+        let region =
+            sim::Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad };
+        self.stage.as_ref().map(|stage| stage.compiled.truth(region))
+    }
+}
+
+impl Stage {
+    fn with_seed(&self, rig: &Rig, seed: u64) -> Result<Self, Failure> {
+        compile(self.compiled.scene().clone(), rig, seed)
+    }
+}
+
+/// Reads the rig that the choice or the plan names; with neither it is an error, so that no
+/// fabricated data come by forgetting a flag.
+fn read_rig(
+    inputs: &mut Inputs,
+    plan_path: &Path,
+    plan: &Plan,
+    choice: &Choice,
+) -> Result<Rig, Failure> {
+    if inputs.remembers(InputRole::Rig) {
+        return Ok(Rig::read(inputs.document(InputRole::Rig, Path::new("rig.toml"))?)?);
+    }
+    let from_plan = || {
+        let name = plan.rig.as_deref()?;
+        Some(if name == BUILT_IN { PathBuf::from(name) } else { beside(plan_path, name) })
+    };
+    let path = choice.rig.clone().or_else(from_plan).ok_or_else(|| {
+        Failure::with_help(
+            format!("{}: the plan names no rig, and neither does --rig", plan_path.display()),
+            "add `rig = \"rig.toml\"` (or \"simulated\") to the plan, or give --rig",
+        )
+    })?;
+    rig_at(inputs, &path)
+}
+
+/// The rig at a path, or the built-in one by its name.
+pub(crate) fn rig_at(inputs: &mut Inputs, path: &Path) -> Result<Rig, Failure> {
+    if path == Path::new(BUILT_IN) {
+        let rig = Rig::built_in()?;
+        inputs.note(InputRole::Rig, rig.document());
+        return Ok(rig);
+    }
+    Ok(Rig::read(inputs.document(InputRole::Rig, path)?)?)
+}
+
+fn read_stage(
+    inputs: &mut Inputs,
+    plan_path: &Path,
+    plan: &Plan,
+    choice: &Choice,
+    rig: &Rig,
+    seed: u64,
+) -> Result<Option<Stage>, Failure> {
+    if !rig.is_simulated() {
+        return match &choice.scene {
+            None => Ok(None),
+            Some(scene) => Err(Failure::with_help(
+                format!("--scene {}: {} is a real rig", scene.display(), rig.name),
+                "leave --scene out, or choose a simulated rig with --rig",
+            )),
+        };
+    }
+    let from_plan = || plan.scene.as_deref().map(|name| beside(plan_path, name));
+    let remembered = || inputs.remembers(InputRole::Scene).then(|| PathBuf::from("scene.toml"));
+    let path = choice.scene.clone().or_else(from_plan).or_else(remembered).ok_or_else(|| {
+        Failure::with_help(
+            format!("{}: a simulated rig needs a scene to look at", plan_path.display()),
+            "add `scene = \"scene.toml\"` to the plan, or give --scene",
+        )
+    })?;
+    Ok(Some(stage_at(inputs, &path, rig, seed)?))
+}
+
+/// Reads the scene at a path and compiles it for the rig.
+pub(crate) fn stage_at(
+    inputs: &mut Inputs,
+    path: &Path,
+    rig: &Rig,
+    seed: u64,
+) -> Result<Stage, Failure> {
+    let document: Document = inputs.document(InputRole::Scene, path)?;
+    let inputs = RefCell::new(inputs);
+    let load = |name: &str| inputs.borrow_mut().attachment(path, name);
+    let scene = sim::Scene::read(&document, nominal(rig).quantity, &load)?;
+    compile(scene, rig, seed)
+}
+
+fn compile(scene: sim::Scene, rig: &Rig, seed: u64) -> Result<Stage, Failure> {
+    let root = rig.document().root();
+    let simulated = root.table("simulated")?.map(sim::Simulated::read).transpose()?;
+    let simulated = simulated.unwrap_or_default();
+    let faults = simulated.faults;
+    let compiled = sim::compile(scene, nominal(rig), simulated, seed)
+        .map_err(|error| Failure::start(format!("{}: {error}", rig.document().source().name())))?;
+    Ok(Stage { compiled: Arc::new(compiled), faults, seed })
+}
+
+/// A plan without a name is called after its folder.
+fn folder_name(plan: &Path) -> String {
+    let absolute = std::path::absolute(plan).unwrap_or_else(|_| plan.to_owned());
+    let folder = absolute.parent().and_then(Path::file_name);
+    folder.map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned())
+}
