@@ -15,6 +15,7 @@
 
 mod component;
 mod dark;
+mod fit_input;
 mod reference;
 mod sample;
 #[cfg(test)]
@@ -22,6 +23,7 @@ mod tests;
 
 pub use component::{Component, Effect};
 pub use dark::Dark;
+pub use fit_input::FitInput;
 pub use reference::{Drift, Reference};
 pub use sample::{Flag, Flags, Sample};
 

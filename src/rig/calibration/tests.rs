@@ -295,6 +295,29 @@ fn an_axis_zero_moves_the_ray_by_what_the_axis_does() {
     assert_close(by(AxisName::Y).y_m, 0.01);
 }
 
+#[test]
+fn the_fit_gets_the_usable_samples_and_what_they_share() {
+    let rig = rig();
+    let mut fine = target(&rig, 2, 0.5);
+    fine.gain = 1;
+    let fine_dark = Reading { gain: 1, ..dark(&rig, 3, DARK_A) };
+    let saturated = Reading { saturated: 3, ..target(&rig, 4, 0.5) };
+    let last = target(&rig, 5, 0.5);
+    let readings = [dark(&rig, 0, DARK_A), target(&rig, 1, 0.5), fine, fine_dark, saturated, last];
+    let calibrated = calibrate(&rig, &readings).unwrap();
+    let input = calibrated.fit_input();
+    assert_eq!(input.places, [0, 1, 3]);
+    let by_name =
+        |name: &str| &input.common.iter().find(|common| common.name == name).unwrap().shift;
+    assert!(matches!(by_name("responsivity"), fit::Shift::Scale));
+    let fit::Shift::Value(excess) = by_name("gain 100 nA") else { panic!("one range alone") };
+    let u = rig.detector.gains[1].u_relative;
+    assert_eq!([0, 1, 2].map(|i| excess(i, 2.0)), [0.0, 2.0 * u, 0.0]);
+    let fit::Shift::Ray(seen) = by_name("x zero") else { panic!("an axis moves rays") };
+    let sample = &input.samples[2];
+    assert_close(seen(2, &sample.ray).x_m - sample.ray.x_m, rig.axes[2].u_zero);
+}
+
 proptest! {
     #[test]
     fn order_is_of_no_consequence(
