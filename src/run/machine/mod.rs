@@ -1,0 +1,467 @@
+//! The run machine: what the device is told next, given what it said and what people ask.
+//!
+//! It knows the steps to do, the last event, and `now`; no link, runtime, file or clock. Feed it
+//! with [`Machine::handle`], [`Machine::handle_request`] and [`Machine::handle_timeout`]; after
+//! each of them take [`Machine::poll_action`] until it is empty, in order, then ask
+//! [`Machine::poll_timeout`]. Actions are to be carried out in that order: a result is
+//! acknowledged only after its `Record` was taken over.
+
+mod advance;
+mod request;
+#[cfg(test)]
+mod tests;
+mod work;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use firmware_protocol::{
+    AxisMask, Cause, CommandId, DwellResult, Event, Instant, Rejection, Request, TickUnwrapper,
+};
+
+pub use request::{Answer, Wish};
+pub use work::Program;
+
+use super::channels;
+use super::state::{Doubt, Fault, Outcome, Position, State};
+use super::warm_up::Stability;
+use crate::plan::Step;
+use crate::rig::{Latched, Rig};
+use work::{Index, Phase, Work, is_warm_up};
+
+/// Commands of one step at most: to its run-up point, to its pose, dwell.
+pub const STEP_COMMANDS_MAX: usize = 3;
+/// How often in a row the device may say that its queue is full before that is a fault.
+const QUEUE_FULL_MAX: u32 = 3;
+
+/// Whether the person's source shines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// It doesn't: how dark readings are taken where there is no shutter.
+    Off,
+    /// It does.
+    On,
+}
+
+/// What a fault leads to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnFault {
+    /// The end of the run.
+    Finish,
+    /// Standing still until somebody says continue.
+    Wait,
+}
+
+/// The rig as the machine sees it, and how to begin.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// Its axes, their channels and their ways.
+    pub rig: Arc<Rig>,
+    /// Home at the start even where the device says that it is homed.
+    pub home_first: bool,
+    /// What a fault leads to.
+    pub on_fault: OnFault,
+}
+
+/// What the device said when a session began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Connected {
+    /// Its boot.
+    pub boot_id: u32,
+    /// Commands that can wait behind the running one.
+    pub queue_depth: u8,
+    /// Channels homed in this boot.
+    pub homed: AxisMask,
+    /// The last command number that it accepted in this boot.
+    pub last_id: Option<CommandId>,
+    /// Its latched fault.
+    pub fault: Option<Cause>,
+}
+
+/// What happens to a run.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Input {
+    /// A session began, at the start or after [`Action::Reconnect`].
+    Connected(Connected),
+    /// The device took a command into its queue.
+    Accepted(CommandId),
+    /// It did not.
+    Rejected(CommandId, Rejection),
+    /// The answer to `ClearFault`.
+    Cleared,
+    /// The other answer to it: the cause persists.
+    ClearRefused(Rejection),
+    /// The answer to `Stop`.
+    Stopping,
+    /// The device said something unasked.
+    Event(Event),
+    /// The checks were judged: go on, or why not.
+    Judged(Result<(), String>),
+    /// Something outside the machine is wrong: the link, the journal.
+    Fault(Fault),
+}
+
+/// What is to be done for a run.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Send this to the device.
+    Send(Request),
+    /// Keep this reading.
+    Record(Box<Taken>),
+    /// The state changed.
+    Became(State),
+    /// The trust in the position changed.
+    Position(Position),
+    /// Something is wrong.
+    Fault(Fault),
+    /// Ask the person to switch the source, and then to continue.
+    AskSource(Source),
+    /// Judge the checks' readings; [`Input::Judged`] is the answer.
+    Judge,
+    /// Open another session.
+    Reconnect,
+    /// The run is over. Nothing follows.
+    Finish(Outcome),
+}
+
+/// A reading as it came.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// What was asked for.
+    pub step: Step,
+    /// The command that it was.
+    pub id: CommandId,
+    /// What the device reported.
+    pub result: DwellResult,
+}
+
+#[derive(Debug)]
+enum What {
+    Home,
+    Move,
+    Dwell { index: Index, settle: Duration },
+}
+
+#[derive(Debug)]
+struct Outstanding {
+    id: CommandId,
+    what: What,
+    // An earlier command went wrong: whatever this one yields, it was not what was meant.
+    is_void: bool,
+}
+
+/// What follows when the axes stand still and nothing is outstanding.
+#[derive(Debug, Clone, PartialEq)]
+enum After {
+    Finish(Outcome),
+    Pause,
+    Resubmit,
+}
+
+/// What follows when a standstill is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Next {
+    Pause,
+    Run,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub struct Machine {
+    setup: Setup,
+    work: Work,
+    state: State,
+    position: Position,
+    // The boot in which this run saw the axes homed.
+    homed_in: Option<u32>,
+    boot_id: u32,
+    window: usize,
+    next_id: u32,
+    outstanding: VecDeque<Outstanding>,
+    // Steps whose commands ended without a reading, to be put back before the next is sent.
+    unmeasured: Vec<Index>,
+    // Where the last move ended or will end; `None` if nobody knows.
+    commanded: Option<Latched>,
+    // The dwell that settles, and until when.
+    settling: Option<(CommandId, Instant)>,
+    // Once the dwell named here is over, stop, then do this.
+    wish: Option<(After, Option<CommandId>)>,
+    after: After,
+    stop_confirmed: bool,
+    // The device refuses commands until it is told `ClearFault`.
+    is_latched: bool,
+    is_clearing: bool,
+    // Nobody is at the other end.
+    is_down: bool,
+    is_reconnecting: bool,
+    // What to do as soon as the device lets us.
+    next: Option<Next>,
+    fault: Option<Fault>,
+    asked: Option<Source>,
+    source: Source,
+    queue_full: u32,
+    ticks: TickUnwrapper,
+    actions: VecDeque<Action>,
+}
+
+impl Machine {
+    /// A machine that waits for [`Input::Connected`].
+    pub fn new(setup: Setup, program: Program) -> Self {
+        Self {
+            setup,
+            work: Work::new(program),
+            state: State::Idle,
+            position: Position::Untrusted(Doubt::NotHomed),
+            homed_in: None,
+            boot_id: 0,
+            window: 1,
+            next_id: 1,
+            outstanding: VecDeque::new(),
+            unmeasured: Vec::new(),
+            commanded: None,
+            settling: None,
+            wish: None,
+            after: After::Pause,
+            stop_confirmed: true,
+            is_latched: false,
+            is_clearing: false,
+            is_down: true,
+            is_reconnecting: false,
+            next: None,
+            fault: None,
+            asked: None,
+            source: Source::On,
+            queue_full: 0,
+            ticks: TickUnwrapper::default(),
+            actions: VecDeque::new(),
+        }
+    }
+
+    /// The state now.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Whether the position is trusted, and why.
+    pub fn position(&self) -> Position {
+        self.position
+    }
+
+    /// The fault that the run stands in.
+    pub fn fault(&self) -> Option<&Fault> {
+        self.fault.as_ref().filter(|_| self.state == State::Faulted)
+    }
+
+    /// Steps done in this session, and steps that it had to do; warm-up and checks apart.
+    pub fn progress(&self) -> (usize, usize) {
+        self.work.progress()
+    }
+
+    /// What to do next. Ask again until `None`, after every `handle_…`.
+    pub fn poll_action(&mut self) -> Option<Action> {
+        self.actions.pop_front()
+    }
+
+    /// When [`Machine::handle_timeout`] wants to be called. Ask again after every `handle_…`.
+    /// `None` while paused, faulted or idle: at rest nothing ticks.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.settling.filter(|_| self.state == State::Settling).map(|(_, until)| until)
+    }
+
+    /// Time has passed.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if self.poll_timeout().is_some_and(|until| until <= now) {
+            self.go(State::Dwelling);
+        }
+    }
+
+    /// Something happened.
+    pub fn handle(&mut self, now: Instant, input: Input) {
+        if self.state == State::Done {
+            return;
+        }
+        match input {
+            Input::Connected(connected) => self.on_connected(connected),
+            Input::Accepted(_) => {}
+            Input::Rejected(id, rejection) => self.on_rejected(id, rejection),
+            Input::Cleared => {
+                self.is_clearing = false;
+                self.is_latched = false;
+            }
+            Input::ClearRefused(rejection) => self.on_clear_refused(rejection),
+            Input::Stopping => self.stop_confirmed = true,
+            Input::Event(event) => self.on_event(now, event),
+            Input::Judged(Ok(())) => self.work.end_judging(),
+            Input::Judged(Err(why)) => self.stand_still(Fault::ReferenceMoved(why)),
+            Input::Fault(fault) => self.stand_still(fault),
+        }
+        self.advance(now);
+    }
+
+    fn on_connected(&mut self, connected: Connected) {
+        let Connected { boot_id, queue_depth, homed, last_id, fault } = connected;
+        let axes = channels::all_axes(&self.setup.rig).0;
+        let is_homed = homed.0 & axes == axes;
+        self.window = usize::from(queue_depth).max(STEP_COMMANDS_MAX);
+        self.next_id = last_id.map_or(1, |last| last.0.saturating_add(1));
+        self.boot_id = boot_id;
+        self.is_reconnecting = false;
+        self.is_down = false;
+        self.forget_session();
+        self.ticks = TickUnwrapper::default();
+        self.is_latched = fault.is_some();
+        self.trust(match (self.position, self.homed_in) {
+            (upset @ Position::Untrusted(Doubt::Upset(_)), _) => upset,
+            (_, Some(was)) if was != boot_id => {
+                Position::Untrusted(Doubt::Restarted { was, is: boot_id })
+            }
+            (_, Some(_)) if is_homed => Position::Trusted { boot_id },
+            (_, None) if is_homed && !self.setup.home_first => Position::Trusted { boot_id },
+            _ => Position::Untrusted(Doubt::NotHomed),
+        });
+        match (self.state, fault) {
+            // What an earlier session left; starting a run is reason enough to clear it.
+            (State::Idle, None | Some(Cause::LeaseExpired | Cause::Stopped)) => {
+                match self.wish.take() {
+                    Some((After::Pause, _)) => self.go(State::Paused),
+                    Some((After::Finish(outcome), _)) => self.finish(outcome),
+                    _ => self.next = Some(Next::Run),
+                }
+            }
+            (State::Idle, Some(cause)) => self.stand_still(Fault::Device(cause)),
+            _ => {}
+        }
+    }
+
+    fn on_clear_refused(&mut self, rejection: Rejection) {
+        self.is_clearing = false;
+        self.next = None;
+        self.stand_still(match rejection {
+            Rejection::Faulted(cause) => Fault::Device(cause),
+            other => Fault::Refused(other),
+        });
+    }
+
+    fn on_rejected(&mut self, id: CommandId, rejection: Rejection) {
+        let Some(refused) = self.end(id) else { return };
+        self.void_after(id);
+        if let What::Dwell { index, .. } = refused.what {
+            self.unmeasured.push(index);
+        }
+        if !self.state.is_active() {
+            return;
+        }
+        match rejection {
+            Rejection::QueueFull if self.queue_full < QUEUE_FULL_MAX => {
+                self.queue_full += 1;
+                self.window = self.window.saturating_sub(1).max(STEP_COMMANDS_MAX);
+                let after = self.wish.take().map_or(After::Resubmit, |(after, _)| after);
+                self.begin_stop(after);
+            }
+            Rejection::Faulted(cause) => self.stand_still(Fault::Device(cause)),
+            other => self.stand_still(Fault::Refused(other)),
+        }
+    }
+
+    fn on_event(&mut self, now: Instant, event: Event) {
+        match event {
+            Event::Started(id, _) => self.note_start(now, id),
+            Event::Done(done) => {
+                self.acknowledge(done.id);
+                let ended = self.end(done.id);
+                if ended.is_some_and(|ended| matches!(ended.what, What::Home)) {
+                    self.homed_in = Some(self.boot_id);
+                    self.commanded = Some(channels::to_axes(&self.setup.rig, &done.readback));
+                    self.trust(Position::Trusted { boot_id: self.boot_id });
+                }
+            }
+            Event::Sampled(result) => self.on_sampled(result),
+            Event::Failed(id, cause, _) => self.on_failed(id, cause),
+        }
+    }
+
+    fn on_sampled(&mut self, result: DwellResult) {
+        let id = result.id;
+        match self.end(id) {
+            Some(Outstanding { what: What::Dwell { index, .. }, is_void: false, .. }) => {
+                let step = *self.work.step(index);
+                let time_s = self.ticks.unwrap(result.end_tick) as f64 * 1e-6;
+                let mean = result.mean;
+                if self.work.record(index) {
+                    self.queue_full = 0;
+                    let taken = Taken { step, id, result };
+                    self.actions.push_back(Action::Record(Box::new(taken)));
+                    self.acknowledge(id);
+                    if is_warm_up(&step) {
+                        self.on_warm_up(time_s, mean);
+                    }
+                    return;
+                }
+            }
+            Some(Outstanding { what: What::Dwell { index, .. }, .. }) => {
+                self.unmeasured.push(index);
+            }
+            _ => {}
+        }
+        self.acknowledge(id);
+    }
+
+    fn on_warm_up(&mut self, time_s: f64, mean: f64) {
+        if let Stability::TimedOut { waited_s, change_relative } = self.work.watch(time_s, mean)
+            && self.state.is_active()
+        {
+            self.stand_still(Fault::NotWarm { waited_s, change_relative });
+        }
+    }
+
+    fn on_failed(&mut self, id: CommandId, cause: Cause) {
+        self.acknowledge(id);
+        let Some(failed) = self.end(id) else { return };
+        self.void_after(id);
+        match failed.what {
+            What::Dwell { index, .. } => self.unmeasured.push(index),
+            What::Home => self.trust(Position::Untrusted(Doubt::Upset(cause))),
+            What::Move => {}
+        }
+        if cause != Cause::Stopped || self.state.is_active() {
+            self.stand_still(Fault::Device(cause));
+        }
+    }
+
+    fn acknowledge(&mut self, id: CommandId) {
+        self.actions.push_back(Action::Send(Request::Acknowledge(id)));
+    }
+
+    /// The command is over, one way or another.
+    fn end(&mut self, id: CommandId) -> Option<Outstanding> {
+        let at = self.outstanding.iter().position(|outstanding| outstanding.id == id)?;
+        self.outstanding.remove(at)
+    }
+
+    fn void_after(&mut self, id: CommandId) {
+        for later in self.outstanding.iter_mut().filter(|outstanding| outstanding.id > id) {
+            later.is_void = true;
+        }
+    }
+
+    fn trust(&mut self, position: Position) {
+        if std::mem::replace(&mut self.position, position) != position {
+            self.actions.push_back(Action::Position(position));
+        }
+    }
+
+    fn go(&mut self, state: State) {
+        if self.state == state {
+            return;
+        }
+        assert!(
+            self.state.may_become(state),
+            "{} can't become {}: a bug in the run machine",
+            self.state.name(),
+            state.name()
+        );
+        self.state = state;
+        self.actions.push_back(Action::Became(state));
+    }
+}

@@ -1,0 +1,185 @@
+//! What is still to be measured, and what has been: each reading is taken over once,
+//! whatever is repeated, stopped or lost on the way.
+
+use std::collections::VecDeque;
+
+use crate::plan::{RESUME_IDS_FROM, Step, WARM_UP_IDS_FROM, WarmUp};
+use crate::run::warm_up::{Gate, Stability};
+
+/// Dwells queued ahead while warming up: each verdict comes this many dwells late at most.
+const WARM_UP_AHEAD: usize = 2;
+
+/// What a run is to do, in this order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Program {
+    /// Waiting for stability: the gate, the reading to take again and again, and how many
+    /// warm-up readings the run has from earlier sessions.
+    pub warm_up: Option<(WarmUp, Step, u32)>,
+    /// The reference pose, measured again after an interruption: somebody judges the readings
+    /// before the run goes on.
+    pub checks: Vec<Step>,
+    /// The steps that have no reading yet, in the plan's order.
+    pub steps: Vec<Step>,
+}
+
+/// In which part of the program the run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Phase {
+    WarmUp,
+    Check,
+    /// The checks are measured, and somebody ponders them.
+    Judging,
+    Steps,
+}
+
+/// Whether a reading only serves to see the source become stable.
+pub(super) fn is_warm_up(step: &Step) -> bool {
+    (WARM_UP_IDS_FROM..RESUME_IDS_FROM).contains(&step.id)
+}
+
+/// Names a step of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Index(usize);
+
+#[derive(Debug)]
+pub(super) struct Work {
+    // Every step that was handed out or will be, and whether its reading was taken over.
+    all: Vec<(Step, bool)>,
+    todo: VecDeque<Index>,
+    checks: VecDeque<Index>,
+    steps: VecDeque<Index>,
+    gate: Option<(Gate, Step, u32)>,
+    phase: Phase,
+    done: usize,
+    total: usize,
+}
+
+impl Work {
+    pub(super) fn new(program: Program) -> Self {
+        let Program { warm_up, checks, steps } = program;
+        let (first_step, total) = (checks.len(), steps.len());
+        let all: Vec<_> = checks.into_iter().chain(steps).map(|s| (s, false)).collect();
+        let steps: VecDeque<_> = (first_step..all.len()).map(Index).collect();
+        let checks: VecDeque<_> = (0..first_step).map(Index).collect();
+        let gate = warm_up.map(|(asked, step, had)| (Gate::new(asked), step, had));
+        let mut work = Self {
+            all,
+            todo: VecDeque::new(),
+            checks,
+            steps,
+            gate,
+            phase: Phase::WarmUp,
+            done: 0,
+            total,
+        };
+        if work.gate.is_none() {
+            work.leave_warm_up();
+        }
+        work
+    }
+
+    pub(super) fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Steps done and to do, warm-up and checks apart.
+    pub(super) fn progress(&self) -> (usize, usize) {
+        (self.done, self.total)
+    }
+
+    pub(super) fn step(&self, index: Index) -> &Step {
+        &self.all[index.0].0
+    }
+
+    /// The next step to hand out, if one may be while `dwells` wait or run on the device.
+    pub(super) fn peek(&mut self, dwells: usize) -> Option<Index> {
+        if self.phase == Phase::WarmUp && self.todo.is_empty() && dwells < WARM_UP_AHEAD {
+            let (_, step, count) = self.gate.as_mut()?;
+            let step = Step { id: WARM_UP_IDS_FROM + *count, ..*step };
+            *count += 1;
+            self.todo.push_back(Index(self.all.len()));
+            self.all.push((step, false));
+        }
+        match self.phase {
+            Phase::Judging => None,
+            Phase::WarmUp | Phase::Check | Phase::Steps => self.todo.front().copied(),
+        }
+    }
+
+    /// Hands out the step that [`Work::peek`] showed.
+    pub(super) fn take(&mut self) -> Option<Index> {
+        self.todo.pop_front()
+    }
+
+    /// Takes back what was handed out and never measured: it comes first again, in order.
+    pub(super) fn put_back(&mut self, mut indices: Vec<Index>) {
+        indices.sort_unstable();
+        for index in indices.into_iter().rev() {
+            let (step, recorded) = &self.all[index.0];
+            // Warm-up readings that nobody waits for any more are not worth repeating.
+            let is_stale = is_warm_up(step) && self.phase != Phase::WarmUp;
+            if !recorded && !is_stale {
+                self.todo.push_front(index);
+            }
+        }
+    }
+
+    /// Notes that the reading was taken over; false if it had been before.
+    pub(super) fn record(&mut self, index: Index) -> bool {
+        let recorded = &mut self.all[index.0].1;
+        if std::mem::replace(recorded, true) {
+            return false;
+        }
+        if self.is_step(index) {
+            self.done += 1;
+        }
+        true
+    }
+
+    fn is_step(&self, index: Index) -> bool {
+        self.all[index.0].0.id < WARM_UP_IDS_FROM
+    }
+
+    /// Shows the gate a warm-up reading, and goes on to the next phase when it passes.
+    pub(super) fn watch(&mut self, time_s: f64, mean: f64) -> Stability {
+        let Some((gate, ..)) = &mut self.gate else { return Stability::Stable };
+        let stability = gate.take(time_s, mean);
+        if stability == Stability::Stable {
+            self.leave_warm_up();
+        }
+        stability
+    }
+
+    /// Goes on without stability.
+    pub(super) fn leave_warm_up(&mut self) {
+        if self.phase != Phase::WarmUp {
+            return;
+        }
+        self.gate = None;
+        self.todo = std::mem::take(&mut self.checks);
+        self.phase = Phase::Check;
+        if self.todo.is_empty() {
+            self.begin_steps();
+        }
+    }
+
+    pub(super) fn begin_judging(&mut self) {
+        self.phase = Phase::Judging;
+    }
+
+    pub(super) fn end_judging(&mut self) {
+        if self.phase == Phase::Judging {
+            self.begin_steps();
+        }
+    }
+
+    fn begin_steps(&mut self) {
+        self.phase = Phase::Steps;
+        self.todo = std::mem::take(&mut self.steps);
+    }
+
+    /// Whether nothing is left to hand out in this phase.
+    pub(super) fn is_handed_out(&self) -> bool {
+        self.phase != Phase::WarmUp && self.todo.is_empty()
+    }
+}
