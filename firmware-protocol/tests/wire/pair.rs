@@ -242,6 +242,8 @@ pub(crate) struct Pair<P> {
     pub(crate) device: P,
     pub(crate) down: Wire,
     pub(crate) up: Wire,
+    /// The host's user wants to be woken then.
+    pub(crate) alarm: Option<Instant>,
 }
 
 impl<P: Peer> Pair<P> {
@@ -253,6 +255,7 @@ impl<P: Peer> Pair<P> {
             device,
             down: Wire::new(seed ^ 0xd0, baud, faults),
             up: Wire::new(seed ^ 0x0b, baud, faults),
+            alarm: None,
         }
     }
 
@@ -267,7 +270,7 @@ impl<P: Peer> Pair<P> {
             self.up.send(self.now, &out[..length]);
         }
         let timeouts = [self.host.poll_timeout(), self.device.poll_timeout()];
-        let arrivals = [self.down.next_arrival(), self.up.next_arrival()];
+        let arrivals = [self.down.next_arrival(), self.up.next_arrival(), self.alarm];
         let Some(next) = timeouts.into_iter().chain(arrivals).flatten().min() else {
             return false;
         };
@@ -287,7 +290,7 @@ impl<P: Peer> Pair<P> {
 
     /// Steps until the host has something to tell, for a simulated minute at most.
     pub(crate) fn next_event(&mut self) -> Option<firmware_protocol::HostEvent> {
-        let end = self.now + Duration::from_secs(60);
+        let end = self.now + Duration::from_mins(1);
         loop {
             if let Some(event) = self.host.poll_event() {
                 return Some(event);
