@@ -42,19 +42,12 @@ fn nominal_axis(axis: &Axis) -> sim::NominalAxis {
         channel: axis.channel,
         counts_per_unit: axis.counts_per_unit,
         travel_counts: axis.count_limits(),
-        speed_counts_per_s: whole(axis.speed * axis.counts_per_unit),
-        acceleration_counts_per_s2: whole(axis.acceleration * axis.counts_per_unit),
+        speed_counts_per_s: axis.counts_per_s(),
+        acceleration_counts_per_s2: axis.counts_per_s2(),
         settle_s: axis.settle.as_secs_f64(),
         has_encoder: matches!(axis.readback, Readback::Encoder),
         u_zero: axis.u_zero,
         u_homing: axis.u_homing,
         u_readback: axis.u_readback,
     }
-}
-
-/// rig.toml's reader keeps speed and acceleration between 1 and 2^31 counts; the device's are
-/// whole numbers not above what the file says.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn whole(counts: f64) -> u32 {
-    counts.floor() as u32
 }

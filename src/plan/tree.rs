@@ -7,7 +7,7 @@
 //!
 //! It knows times and places, not targets. Every answer depends on its input alone.
 
-use crate::rig::{AxisPositions, Rig, rest_to_rest_s};
+use crate::rig::{AxisPositions, Rig};
 
 /// The rig's axes as far as the time of a move goes.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +31,18 @@ impl MoveTime {
     }
 
     fn along(&self, axis: usize, distance: f64) -> f64 {
-        rest_to_rest_s(distance, self.speed[axis], self.acceleration[axis])
+        rest_to_rest_s(distance.abs(), self.speed[axis], self.acceleration[axis])
+    }
+}
+
+/// Seconds over a distance with a trapezoid of speed, or a triangle where it is short. The device's
+/// own profile ([`firmware_protocol::Trapezoid`]) keeps its last digit, which costs time, and a
+/// choice between ways doesn't need it.
+fn rest_to_rest_s(distance: f64, speed: f64, acceleration: f64) -> f64 {
+    if distance * acceleration <= speed * speed {
+        2.0 * libm::sqrt(distance / acceleration)
+    } else {
+        distance / speed + speed / acceleration
     }
 }
 
@@ -192,6 +203,13 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn times_are_those_of_the_device(distance in 0.0..10.0_f64) {
+            let profile = firmware_protocol::Trapezoid::new(distance, 1.0, 2.0).unwrap();
+            let error_s = rest_to_rest_s(distance, 1.0, 2.0) - profile.duration_s();
+            prop_assert!(error_s.abs() < 1e-14 * (1.0 + profile.duration_s()));
+        }
+
         #[test]
         fn taking_the_nearest_until_none_is_left_agrees_with_a_plain_search(points in places()) {
             let mut tree = Tree::new(&points, time());

@@ -125,6 +125,16 @@ impl Axis {
         (low as i32, high as i32)
     }
 
+    /// Its highest speed as the device knows it: whole counts a second, none too many.
+    pub fn counts_per_s(&self) -> u32 {
+        whole_within(self.speed * self.counts_per_unit)
+    }
+
+    /// Its acceleration as the device knows it: whole counts a second squared, none too many.
+    pub fn counts_per_s2(&self) -> u32 {
+        whole_within(self.acceleration * self.counts_per_unit)
+    }
+
     /// Whether the axis may stand at `position`, and can come there from its own side.
     pub fn check(&self, position: f64) -> Result<(), LimitError> {
         let axis = self.name;
@@ -165,6 +175,13 @@ impl Axis {
     }
 }
 
+/// The whole number of counts inside, but for the rounding of units: 60°/s at 1000 counts a degree
+/// are 60 000 counts a second, although radians make it a little less.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the rig reader checked it
+fn whole_within(counts: f64) -> u32 {
+    libm::floor(counts * (1.0 + COUNT_SLACK)) as u32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -197,6 +214,8 @@ mod tests {
         let below = axis.check((-95.01_f64).to_radians()).unwrap_err();
         assert_eq!(below.to_string(), "theta: -95.010° is below the lower limit -95.000°");
         assert_eq!(axis.count_limits(), (-38_000, 38_000));
+        let axis = Axis { speed: 60.0_f64.to_radians(), ..axis };
+        assert_eq!(axis.counts_per_s(), 24_000);
     }
 
     #[test]

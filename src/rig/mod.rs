@@ -20,7 +20,6 @@ pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
 pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
-pub use motion::rest_to_rest_s;
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
 pub use reading::{Latched, Reading, ReadingKind};
 

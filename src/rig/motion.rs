@@ -1,52 +1,47 @@
-//! How long moves take: rest to rest, trapezoidal speed, all axes together.
+//! How long moves take, by the very profile that devices run.
 
 use std::time::Duration;
 
+use firmware_protocol::Trapezoid;
+
 use super::{AxisPositions, Latched, Rig};
 
-/// The time, seconds, to come from rest to rest over `distance` with at most `speed`, speeding up
-/// and slowing down at `acceleration` (a triangle of speed where the distance is too short to
-/// reach the full one). The three are in one unit of length or angle; `distance` may be negative.
-pub fn rest_to_rest_s(distance: f64, speed: f64, acceleration: f64) -> f64 {
-    let distance = distance.abs();
-    if distance * acceleration <= speed * speed {
-        2.0 * libm::sqrt(distance / acceleration)
-    } else {
-        distance / speed + speed / acceleration
-    }
-}
-
 impl Rig {
-    /// The time of one time-synchronised move between two places in counts, as the device runs it:
-    /// in whole microseconds, none too short.
+    /// The time of one time-synchronised move between two places in counts, from rest to rest: that
+    /// of its slowest axis, in whole microseconds, none too short.
     pub fn move_duration(&self, from: Latched, to: Latched) -> Duration {
         let mut longest_s = 0.0_f64;
         for (i, axis) in self.axes.iter().enumerate() {
-            let distance = axis.position(f64::from(to.0[i]) - f64::from(from.0[i]));
-            longest_s = longest_s.max(rest_to_rest_s(distance, axis.speed, axis.acceleration));
+            let distance = (f64::from(to.0[i]) - f64::from(from.0[i])).abs();
+            let speed = f64::from(axis.counts_per_s());
+            let acceleration = f64::from(axis.counts_per_s2());
+            let profile = Trapezoid::new(distance, speed, acceleration);
+            longest_s = longest_s.max(profile.map_or(0.0, |profile| profile.duration_s()));
         }
         Duration::from_secs_f64(libm::ceil(longest_s * 1e6) / 1e6)
     }
 
-    /// The time, seconds, of one time-synchronised move: that of its slowest axis.
+    /// The same, in seconds, between positions.
     pub fn move_time_s(&self, from: AxisPositions, to: AxisPositions) -> f64 {
-        let ends = from.0.iter().zip(to.0);
-        self.axes.iter().zip(ends).fold(0.0, |longest: f64, (axis, (from, to))| {
-            longest.max(rest_to_rest_s(to - from, axis.speed, axis.acceleration))
-        })
+        self.move_duration(self.counts(from), self.counts(to)).as_secs_f64()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::rest_to_rest_s;
+    use super::*;
 
     #[test]
-    fn short_moves_are_triangles_and_long_ones_trapezoids() {
-        assert!(rest_to_rest_s(0.0, 60.0, 120.0).abs() < 1e-300);
+    fn the_slowest_axis_decides_and_short_moves_are_triangles() {
+        let rig = Rig::built_in().unwrap();
+        let home = Latched([0; 4]);
+        let time_ms = |to: Latched| rig.move_duration(home, to).as_secs_f64() * 1e3;
+        assert_eq!(rig.move_duration(home, home), Duration::ZERO);
         // 30° just reach 60°/s at 120°/s²: half a second up, half a second down.
-        assert!((rest_to_rest_s(30.0, 60.0, 120.0) - 1.0).abs() < 1e-15);
-        assert!((rest_to_rest_s(-90.0, 60.0, 120.0) - 2.0).abs() < 1e-15);
-        assert!((rest_to_rest_s(0.3, 60.0, 120.0) - 0.1).abs() < 1e-15);
+        assert!((time_ms(Latched([30_000, 0, 0, 0])) - 1e3).abs() < 2e-3);
+        assert!((time_ms(Latched([30_000, -90_000, 0, 0])) - 2e3).abs() < 2e-3);
+        assert!((time_ms(Latched([300, 0, 0, 0])) - 100.0).abs() < 2e-3);
+        // 45 mm at 100 mm/s and 500 mm/s².
+        assert!((time_ms(Latched([300, 0, 45_000, 0])) - 650.0).abs() < 2e-3);
     }
 }
