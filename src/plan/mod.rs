@@ -6,6 +6,8 @@
 //! exists.
 
 mod cost;
+#[cfg(test)]
+mod example_tests;
 mod file;
 #[cfg(test)]
 mod file_tests;
