@@ -15,6 +15,7 @@
 
 mod component;
 mod dark;
+mod fitting;
 mod fit_input;
 mod reference;
 mod sample;
@@ -23,6 +24,7 @@ mod tests;
 
 pub use component::{Component, Effect};
 pub use dark::Dark;
+pub use fitting::Fitted;
 pub use fit_input::FitInput;
 pub use reference::{Drift, Reference};
 pub use sample::{Flag, Flags, Sample};
