@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 
 use spanned_toml::{Bounds, Document, Problem, Table};
 
-use super::{EXPONENT_MAX, Emitter, Scene, SceneError, Shape};
+use super::{EXPONENT_MAX, Emitter, Scene, SceneError, Shape, photometric};
 use crate::Quantity;
 
 /// Reads a file that the scene names, by the name that it gives it: the caller knows relative to
@@ -22,6 +22,7 @@ const LEVEL_MAX: f64 = 1e15;
 enum Kind {
     CosinePower,
     Lambertian,
+    PhotometricFile,
 }
 
 impl Scene {
@@ -47,10 +48,14 @@ impl Scene {
     }
 }
 
-fn read_emitter(table: Table<'_>, scene: &mut Scene, _load: Load<'_>) -> Result<(), Problem> {
+fn read_emitter(table: Table<'_>, scene: &mut Scene, load: Load<'_>) -> Result<(), Problem> {
     let kind = table.required_choice(
         "kind",
-        &[("cosine-power", Kind::CosinePower), ("lambertian", Kind::Lambertian)],
+        &[
+            ("lambertian", Kind::Lambertian),
+            ("cosine-power", Kind::CosinePower),
+            ("photometric-file", Kind::PhotometricFile),
+        ],
     )?;
     let emitter = match kind {
         Kind::CosinePower => {
@@ -62,6 +67,11 @@ fn read_emitter(table: Table<'_>, scene: &mut Scene, _load: Load<'_>) -> Result<
         Kind::Lambertian => {
             let radiance = read_level(&table, scene.quantity, 1.0 / PI)?;
             Emitter::lambertian(required_shape(&table)?, radiance)
+        }
+        Kind::PhotometricFile => {
+            let (emitter, notes) = photometric::read(&table, scene.quantity, load)?;
+            scene.notes.extend(notes);
+            emitter
         }
     };
     scene.add(emitter).map_err(|e| {
@@ -140,7 +150,7 @@ fn required_shape(table: &Table<'_>) -> Result<Shape, Problem> {
 }
 
 /// The outline that is written, if one is.
-fn read_shape(table: &Table<'_>) -> Result<Option<Shape>, Problem> {
+pub(super) fn read_shape(table: &Table<'_>) -> Result<Option<Shape>, Problem> {
     let extent = Bounds::between(-EXTENT_MM, EXTENT_MM);
     let x = table.interval("x_mm", extent)?.map(metres);
     let y = table.interval("y_mm", extent)?.map(metres);

@@ -5,6 +5,7 @@
 
 mod file;
 mod law;
+mod photometric;
 mod shape;
 mod tabulated;
 
