@@ -53,6 +53,7 @@ mod basis;
 mod check;
 mod error;
 mod fitted;
+mod grid;
 mod peak;
 mod sample;
 mod shift;

@@ -8,7 +8,7 @@ use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{BasisSpec, Common, FitError, Noise, Region, Sample, Shift};
+use crate::{BasisSpec, Common, FitError, Noise, Region, Sample, Shift, undetermined};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -23,6 +23,9 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     check(samples, region, basis, common)?;
     let basis = Basis::new(basis, *region);
+    if let Some(refusal) = undetermined::by_count(samples, &basis) {
+        return Err(refusal);
+    }
     let settled = settle(samples, &basis, samples.len() - basis.len())?;
     let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c)).collect();
     let sides = sensitivities(samples, &basis, &settled, &shifting)?;

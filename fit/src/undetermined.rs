@@ -1,10 +1,11 @@
 //! Says in words what the samples leave open when a fit's coefficients are not all determined.
-//! Looks at where the samples lie, not at their values.
+//! Looks at where the samples lie, not at their values, and at poses as they were meant: readings
+//! of one azimuth scatter about it, and arithmetic would take that scatter for information.
 
 use crate::basis::{Basis, Scratch};
+use crate::grid::Grid;
 use crate::triangle::{Spectrum, Triangle};
 use crate::{FitError, Ray, Sample};
-use std::f64::consts::PI;
 use std::fmt;
 
 /// Something that is missing from the samples.
@@ -42,8 +43,10 @@ pub enum Cause {
     Polar {
         /// Distinct angles found.
         distinct: usize,
-        /// Degree of the basis in direction: half of it and one more are needed.
+        /// Degree of the basis in direction.
         degree: usize,
+        /// Distinct angles that the degree needs.
+        needed: usize,
     },
     /// The cone measured is smaller than the region's.
     Beyond {
@@ -87,11 +90,10 @@ impl fmt::Display for Cause {
                  {degree} needs {}",
                 degree + 1
             ),
-            Self::Polar { distinct, degree } => write!(
+            Self::Polar { distinct, degree, needed } => write!(
                 f,
-                "only {distinct} distinct angle{} theta: degree {degree} needs {}",
-                plural(*distinct),
-                degree / 2 + 1
+                "only {distinct} distinct angle{} theta: degree {degree} needs {needed}",
+                plural(*distinct)
             ),
             Self::Beyond { theta_rad } => {
                 write!(f, "nothing was measured beyond {:.1}°", theta_rad.to_degrees())
@@ -111,8 +113,28 @@ fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
+/// The refusal of samples that leave coefficients open for want of distinct coordinates, whatever
+/// their scatter seems to tell.
+pub(crate) fn by_count(samples: &[Sample], basis: &Basis) -> Option<FitError> {
+    let grid = Grid::of(samples, basis.region());
+    let too_few = !positions(&grid, basis).is_empty() || !directions(&grid, basis).is_empty();
+    let rays = || samples.iter().map(|s| grid.snap(&s.ray)).collect::<Vec<Ray>>();
+    too_few.then(|| refusal(&rays(), &grid, basis))
+}
+
+/// The refusal of samples whose factorisation lacks rank.
+pub(crate) fn by_rank(samples: &[Sample], basis: &Basis) -> FitError {
+    let rays: Vec<Ray> = samples.iter().map(|s| s.ray).collect();
+    refusal(&rays, &Grid::of(samples, basis.region()), basis)
+}
+
 /// The refusal, with its causes and the functions that are involved most.
-pub(crate) fn refusal(samples: &[Sample], basis: &Basis, spectrum: &Spectrum) -> FitError {
+fn refusal(rays: &[Ray], grid: &Grid, basis: &Basis) -> FitError {
+    let Some(spectrum) = spectrum(rays, basis.len(), basis, |ray, scratch, row| {
+        basis.row(ray, scratch, row);
+    }) else {
+        return FitError::OutOfRange;
+    };
     let mut by_share: Vec<(usize, f64)> =
         spectrum.undetermined_shares().into_iter().enumerate().collect();
     by_share.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -120,113 +142,106 @@ pub(crate) fn refusal(samples: &[Sample], basis: &Basis, spectrum: &Spectrum) ->
     FitError::Undetermined {
         rank: spectrum.rank(),
         coefficients: basis.len(),
-        causes: causes(samples, basis),
+        causes: causes(rays, grid, basis),
         functions: involved.map(|(k, _)| basis.name(*k)).collect(),
     }
 }
 
-fn causes(samples: &[Sample], basis: &Basis) -> Vec<Cause> {
-    let mut causes = Vec::new();
-    positions(samples, basis, &mut causes);
-    directions(samples, basis, &mut causes);
+fn causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
+    let mut causes = positions(grid, basis);
+    let terms = basis.position_len();
+    let rank = rank(rays, terms, basis, |ray, scratch, row| {
+        basis.position(ray, scratch);
+        row.copy_from_slice(scratch.position());
+    });
+    if causes.is_empty() && rank < terms {
+        causes.push(Cause::PositionsTogether { rank, terms });
+    }
+    causes.extend(angular_causes(rays, grid, basis));
     if causes.is_empty() {
         causes.push(Cause::NotCrossed);
     }
     causes
 }
 
-fn positions(samples: &[Sample], basis: &Basis, causes: &mut Vec<Cause>) {
-    let degree = basis.spec().position_degree;
-    let scaled = |pick: fn((f64, f64)) -> f64| {
-        distinct(samples.iter().map(|s| pick(basis.region().scaled(&s.ray))), POSITION_APART)
-    };
-    let before = causes.len();
-    for (axis, distinct) in [("x", scaled(|p| p.0)), ("y", scaled(|p| p.1))] {
-        if distinct <= degree {
-            causes.push(Cause::Positions { axis, distinct, degree });
-        }
-    }
-    let terms = basis.position_len();
-    let rank = rank(samples, terms, basis, |ray, scratch, row| {
-        basis.position(ray, scratch);
-        row.copy_from_slice(scratch.position());
-    });
-    if causes.len() == before && rank < terms {
-        causes.push(Cause::PositionsTogether { rank, terms });
-    }
-}
-
-fn directions(samples: &[Sample], basis: &Basis, causes: &mut Vec<Cause>) {
-    let degree = basis.spec().angular_degree;
+fn angular_causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
     let terms = basis.angular_len();
-    let rank = rank(samples, terms, basis, |ray, _, row| {
+    let rank = rank(rays, terms, basis, |ray, _, row| {
         basis.direction(ray.theta_rad, ray.phi_rad, row);
     });
     if rank == terms {
-        return;
+        return Vec::new();
     }
-    let before = causes.len();
-    let off_axis = samples.iter().map(|s| s.ray).filter(|ray| ray.theta_rad > ANGLE_APART);
-    let lines: Vec<f64> = off_axis.map(|ray| azimuth_line(ray.phi_rad)).collect();
-    let azimuths = distinct(lines.iter().copied(), ANGLE_APART);
-    match lines.first() {
-        Some(phi_rad) if azimuths == 1 => causes.push(Cause::OneAzimuth { phi_rad: *phi_rad }),
-        _ if (1..=degree).contains(&azimuths) => {
-            causes.push(Cause::Azimuths { distinct: azimuths, degree });
-        }
-        _ => {}
-    }
-    let polar = distinct(samples.iter().map(|s| s.ray.theta_rad), ANGLE_APART);
-    if polar <= degree / 2 {
-        causes.push(Cause::Polar { distinct: polar, degree });
-    }
-    let theta_rad = samples.iter().map(|s| s.ray.theta_rad).fold(0.0, f64::max);
+    let mut causes = directions(grid, basis);
+    let theta_rad = rays.iter().map(|ray| ray.theta_rad).fold(0.0, f64::max);
     if theta_rad < CONE_SHARE * basis.region().theta_max_rad {
         causes.push(Cause::Beyond { theta_rad });
     }
-    if causes.len() == before {
+    if causes.is_empty() {
         causes.push(Cause::DirectionsTogether { rank, terms });
     }
+    causes
 }
 
-/// φ as a line through the pole, in [0, π): an arm swung to the other side is on the same line.
-fn azimuth_line(phi_rad: f64) -> f64 {
-    let line = phi_rad.rem_euclid(PI);
-    if PI - line < ANGLE_APART { 0.0 } else { line }
+/// A product of d factors x - xᵢ is a polynomial of degree d that vanishes at d positions.
+fn positions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
+    let degree = basis.spec().position_degree;
+    let axes = [("x", grid.x_m.len()), ("y", grid.y_m.len())].into_iter();
+    axes.filter(|(_, distinct)| *distinct <= degree)
+        .map(|(axis, distinct)| Cause::Positions { axis, distinct, degree })
+        .collect()
 }
 
-/// How many values there are when those closer than `apart` to their neighbour count as one.
-fn distinct(values: impl Iterator<Item = f64>, apart: f64) -> usize {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup_by(|a, b| (*a - *b).abs() < apart);
-    sorted.len()
+/// A product of lines through the pole vanishes on as many azimuth lines as it has factors; a
+/// product of circles, of degree 2 each, on as many angles from the normal. A line more takes in
+/// the pole.
+fn directions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
+    let degree = basis.spec().angular_degree;
+    let mut causes = Vec::new();
+    match grid.azimuth_lines_rad.as_slice() {
+        [phi_rad] if degree > 0 => causes.push(Cause::OneAzimuth { phi_rad: *phi_rad }),
+        lines if (1..=degree).contains(&lines.len()) => {
+            causes.push(Cause::Azimuths { distinct: lines.len(), degree });
+        }
+        _ => {}
+    }
+    let distinct = grid.theta_rad.len();
+    let needed = if grid.has_pole() { degree.div_ceil(2) + 1 } else { degree / 2 + 1 };
+    if distinct < needed {
+        causes.push(Cause::Polar { distinct, degree, needed });
+    }
+    causes
 }
 
-/// The rank of a part of the basis over the samples.
+/// The rank of a part of the basis over the rays.
 fn rank(
-    samples: &[Sample],
+    rays: &[Ray],
+    terms: usize,
+    basis: &Basis,
+    fill: impl FnMut(&Ray, &mut Scratch, &mut [f64]),
+) -> usize {
+    spectrum(rays, terms, basis, fill).map_or(terms, |spectrum| spectrum.rank())
+}
+
+fn spectrum(
+    rays: &[Ray],
     terms: usize,
     basis: &Basis,
     mut fill: impl FnMut(&Ray, &mut Scratch, &mut [f64]),
-) -> usize {
+) -> Option<Spectrum> {
     let mut triangle = Triangle::new(terms, 0);
     let mut scratch = basis.scratch();
     let mut row = vec![0.0; terms];
-    for sample in samples {
-        fill(&sample.ray, &mut scratch, &mut row);
+    for ray in rays {
+        fill(ray, &mut scratch, &mut row);
         triangle.absorb(&row);
     }
-    triangle.solve().and_then(|solution| solution.spectrum()).map_or(terms, |s| s.rank())
+    triangle.solve()?.spectrum()
 }
 
 /// Most functions that are named.
 const NAMES_MAX: usize = 8;
 /// A function with less than this share in the undetermined combinations isn't named.
 const SHARE_MIN: f64 = 1e-3;
-/// Angles closer than this (0.006°) count as one, radians: readbacks scatter so much.
-const ANGLE_APART: f64 = 1e-4;
-/// Positions closer than this share of the half width count as one.
-const POSITION_APART: f64 = 1e-4;
 /// A cone of at least this share of the region's is not to blame.
 const CONE_SHARE: f64 = 0.9;

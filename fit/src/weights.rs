@@ -33,7 +33,7 @@ pub(crate) fn settle(samples: &[Sample], basis: &Basis, dof: usize) -> Result<Se
         if pass == 0 {
             let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
             if spectrum.rank() < basis.len() {
-                return Err(undetermined::refusal(samples, basis, &spectrum));
+                return Err(undetermined::by_rank(samples, basis));
             }
         }
         settled.coefficients = solution.unknowns(0);

@@ -4,7 +4,7 @@
 mod scenes;
 
 use fit::{BasisSpec, Common, FitError, Noise, Ray, Region, Sample, Shift};
-use scenes::{REGION, exact, raster_rays, spread_rays};
+use scenes::{Die, REGION, exact, raster_rays, spread_rays};
 
 const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 2 };
 
@@ -91,6 +91,23 @@ fn too_few_azimuths_and_polar_angles_are_counted() {
     says(&text, "distinct azimuth lines (phi and phi + 180° count as one): degree 4 needs 5");
     let text = refused_rays(|ray| ray.theta_rad = if ray.theta_rad < 0.8 { 0.3 } else { 1.2 });
     says(&text, "only 2 distinct angles theta: degree 4 needs 3");
+}
+
+#[test]
+fn scatter_about_too_few_azimuths_is_no_information() {
+    // Eight meridians at 0.01° of readback scatter: degree 8 has a solution, of noise alone.
+    let mut die = Die::new(6);
+    let basis = BasisSpec { angular_degree: 8, position_degree: 0 };
+    let mut rays = raster_rays(&REGION, 12, 16, 2);
+    for ray in &mut rays {
+        ray.theta_rad = (ray.theta_rad + 2e-4 * die.uniform()).min(1.5);
+        ray.phi_rad += 2e-4 * die.uniform();
+        ray.x_m += 1e-6 * die.uniform();
+    }
+    let text = refusal(&exact(&rays, |_| 1.0), &REGION, basis);
+    says(&text, "44 of 45 coefficients are determined");
+    says(&text, "only 8 distinct azimuth lines");
+    says(&text, "most involved: Z(8,-8)");
 }
 
 #[test]
