@@ -179,3 +179,28 @@ pub fn decode(packed: &mut [u8]) -> Result<Frame<'_>, FrameError> {
     };
     Ok(Frame { header, body: &checked[HEADER..] })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stated_length_unlike_the_one_found_is_refused_though_the_check_is_right() {
+        let mut decoded = [0x11, 0x2a, 12, 0x05, 0x40, 0, 0, 0, 0];
+        let check = CRC.checksum(&decoded[..5]).to_le_bytes();
+        decoded[5..].copy_from_slice(&check);
+        let mut packed = [0; 16];
+        let length = cobs::try_encode(&decoded, &mut packed).unwrap();
+        assert_eq!(decode(&mut packed[..length]), Err(FrameError::Length(12, 9)));
+    }
+
+    #[test]
+    fn bodies_fit_up_to_the_largest() {
+        let header = Header { kind: Kind::Reply, major: 1, seq: 0, type_byte: 1 };
+        let (body, mut wire) = ([1; BODY_MAX + 1], [0; WIRE_MAX]);
+        assert_eq!(encode(header, &body[1..], &mut wire), Some(WIRE_MAX));
+        assert_eq!(decode(&mut wire[1..=DECODED_MAX + 1]).map(|frame| frame.header), Ok(header));
+        assert_eq!(encode(header, &body, &mut wire), None);
+        assert_eq!(encode(header, &body[1..], &mut wire[1..]), None);
+    }
+}

@@ -1,6 +1,12 @@
 //! The wire between host and rig, and the device-side core that a microcontroller and the
 //! simulated board run alike. `PROTOCOL.md` beside this crate is normative.
 //!
+//! From the wire upwards: [`frame`] packs and checks bytes, [`Decoder`] finds frames in a stream,
+//! [`ToDevice`] and [`ToHost`] are messages with the session and boot that they belong to. Above
+//! that, [`HostEndpoint`] is the host's end of the reliable link and [`DeviceEndpoint`] the
+//! device's; [`DeviceCore`] does what requests say, on a [`Board`]; and [`Device`] is link and
+//! core together, which is all that firmware or a simulator pumps.
+//!
 //! No networking, no clock, no heap: bytes and the time come in as arguments, bytes and events
 //! are polled out. The crate does not know angles or radiance: positions are counts, readings
 //! are ADC counts.

@@ -144,7 +144,7 @@ fn a_host_that_goes_silent_has_the_device_stop_and_finds_it_stopped() {
         let request = move_to([20_000 + id, 0, 0, 0])(CommandId(id.unsigned_abs()));
         pair.host.submit(pair.now, request).unwrap();
     }
-    while !matches!(pair.next_event(), Some(HostEvent::Event(Event::Started(..)))) {}
+    pair.wait_for(|event| matches!(event, HostEvent::Event(Event::Started(..))));
     // The cable is pulled.
     (pair.down.faults.drop, pair.up.faults.drop) = (1.0, 1.0);
     let end = pair.now + LEASE + Duration::from_millis(100);
@@ -160,16 +160,7 @@ fn a_host_that_goes_silent_has_the_device_stop_and_finds_it_stopped() {
     assert_eq!(failed, [10, 11, 12, 13].map(|id| (id, Cause::LeaseExpired)));
     pair.host.submit(pair.now, move_to([0; 4])(CommandId(20))).unwrap();
     let faulted = Reply::Rejected(CommandId(20), Rejection::Faulted(Cause::LeaseExpired));
-    loop {
-        match pair.next_event() {
-            Some(HostEvent::Reply { reply: Reply::Rejected(id, why), .. }) => {
-                assert_eq!(Reply::Rejected(id, why), faulted);
-                break;
-            }
-            Some(_) => {}
-            None => panic!("no answer"),
-        }
-    }
+    pair.wait_for(|event| matches!(event, HostEvent::Reply { reply, .. } if *reply == faulted));
 }
 
 #[test]

@@ -201,7 +201,7 @@ fn requests_behind_a_lost_one_wait_for_it() {
     assert_eq!(pair.host.submit(pair.now, move_to(5)), Err(SubmitError::WindowFull));
     let begin = pair.now;
     for _ in 0..4 {
-        while !matches!(pair.next_event(), Some(HostEvent::Reply { .. })) {}
+        pair.wait_for(|event| matches!(event, HostEvent::Reply { .. }));
     }
     let executed: Vec<_> = pair.device.executed.iter().filter_map(Request::command).collect();
     assert_eq!(executed, [1, 2, 3, 4].map(CommandId));
@@ -274,7 +274,7 @@ fn a_late_identify_of_a_past_session_does_not_bring_it_back() {
     pair.down.send(pair.now, &late);
     pair.down.send(pair.now, &late);
     pair.host.submit(pair.now, Request::KeepAlive).unwrap();
-    while !matches!(pair.next_event(), Some(HostEvent::Reply { .. })) {}
+    pair.wait_for(|event| matches!(event, HostEvent::Reply { .. }));
     assert_eq!(pair.device.executed.len(), 4, "two sessions, a move, a sign of life");
 }
 

@@ -300,4 +300,17 @@ impl<P: Peer> Pair<P> {
             }
         }
     }
+
+    /// Steps until an event for which this holds; others are dropped.
+    pub(crate) fn wait_for(
+        &mut self,
+        is_meant: impl Fn(&firmware_protocol::HostEvent) -> bool,
+    ) -> firmware_protocol::HostEvent {
+        loop {
+            let event = self.next_event().expect("nothing happens any more");
+            if is_meant(&event) {
+                return event;
+            }
+        }
+    }
 }
