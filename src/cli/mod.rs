@@ -7,7 +7,10 @@ mod failure;
 mod inputs;
 mod nominal;
 mod plan;
+mod ports;
+mod session;
 mod setup;
+mod simulated;
 mod text;
 
 use std::process::ExitCode;
@@ -21,6 +24,8 @@ use failure::Failure;
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Explain(args) => explain::explain(&args),
+        Command::Sim(args) => simulated::sim(&args),
+        Command::Ports(args) => ports::ports(&args),
         Command::Plan(args) => plan::plan(&args),
         _ => Err(Failure::start("not in this build")),
     };

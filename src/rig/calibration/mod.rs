@@ -15,8 +15,8 @@
 
 mod component;
 mod dark;
-mod fitting;
 mod fit_input;
+mod fitting;
 mod reference;
 mod sample;
 #[cfg(test)]
@@ -24,8 +24,8 @@ mod tests;
 
 pub use component::{Component, Effect};
 pub use dark::Dark;
-pub use fitting::Fitted;
 pub use fit_input::FitInput;
+pub use fitting::Fitted;
 pub use reference::{Drift, Reference};
 pub use sample::{Flag, Flags, Sample};
 

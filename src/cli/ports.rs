@@ -1,0 +1,102 @@
+//! `gonio ports`: which serial ports there are; with --probe, who answers on one.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use serde_json::json;
+
+use super::args::PortsArgs;
+use super::failure::{Failure, Outcome};
+use super::session::draw_session;
+use super::text::table;
+use crate::device::{Native, SerialSettings, list_ports, open_serial};
+
+/// A board that was reset by opening its port listens after two or three seconds.
+const PATIENCE: Duration = Duration::from_secs(4);
+
+/// Lists the ports and opens none, or asks one who is there.
+pub(crate) fn ports(args: &PortsArgs) -> Outcome {
+    if let Some(port) = &args.probe {
+        return probe(port, args.baud, args.json);
+    }
+    let ports = list_ports().map_err(|error| Failure::start(format!("serial ports: {error}")))?;
+    if args.json {
+        let list: Vec<_> = ports
+            .iter()
+            .map(|port| json!({"path": port.path, "description": port.description}))
+            .collect();
+        println!("{}", json!({ "ports": list }));
+    } else if ports.is_empty() {
+        println!("no serial port; a pseudo-terminal of `gonio sim --pty` is opened by its path");
+    } else {
+        let rows: Vec<_> = ports.into_iter().map(|p| vec![p.path, p.description]).collect();
+        print!("{}", table(&rows));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
+    eprintln!("opening {port} at {baud} baud and asking who is there; nothing will move");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+    let settings = SerialSettings {
+        port: port.to_owned(),
+        baud,
+        reset_on_open: false,
+        boot_wait: Duration::ZERO,
+    };
+    let identity = runtime.block_on(async {
+        let link = open_serial(&settings).await.map_err(Failure::start)?;
+        let (_, identity) =
+            Native::connect(link, draw_session(), baud, PATIENCE).await.map_err(Failure::start)?;
+        Ok::<_, Failure>(identity)
+    })?;
+    let axes: Vec<_> = identity
+        .axes
+        .iter()
+        .map(|axis| {
+            json!({
+                "low_counts": axis.low, "high_counts": axis.high,
+                "speed_counts_per_s": axis.speed,
+                "acceleration_counts_per_s2": axis.acceleration,
+            })
+        })
+        .collect();
+    if is_json {
+        let (major, minor) = identity.protocol;
+        println!(
+            "{}",
+            json!({
+                "port": port, "baud": baud, "protocol": format!("{major}.{minor}"),
+                "boot_id": identity.boot_id, "axes": axes, "gains": identity.gains,
+                "adc_bits": identity.adc_bits, "adc_rate_hz": identity.adc_rate_hz,
+                "queue_depth": identity.queue_depth, "lease_ms": identity.lease_ms,
+            })
+        );
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (major, minor) = identity.protocol;
+    println!(
+        "  a controller of gonio's own protocol {major}.{minor}, boot {:08x}",
+        identity.boot_id
+    );
+    let mut rows =
+        vec![["channel", "low", "high", "speed", "acceleration"].map(str::to_owned).to_vec()];
+    for (channel, axis) in identity.axes.iter().enumerate() {
+        rows.push(vec![
+            channel.to_string(),
+            axis.low.to_string(),
+            axis.high.to_string(),
+            format!("{} counts/s", axis.speed),
+            format!("{} counts/s²", axis.acceleration),
+        ]);
+    }
+    print!("{}", table(&rows));
+    println!(
+        "  {} gain ranges, {}-bit converter at {} Hz",
+        identity.gains, identity.adc_bits, identity.adc_rate_hz
+    );
+    Ok(ExitCode::SUCCESS)
+}

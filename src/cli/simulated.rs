@@ -1,0 +1,128 @@
+//! The simulated device on a byte stream: in this process for a run, or on a pseudo-terminal for
+//! anybody (`gonio sim`).
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use firmware_protocol::Device;
+use tokio::io::{DuplexStream, duplex};
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+
+use super::args::SimArgs;
+use super::failure::{Failure, Outcome};
+use super::inputs::{BUILT_IN, Inputs};
+use super::setup::{Stage, rig_at, stage_at};
+use crate::device::Link;
+
+/// Bytes that wait between host and wire: as much as a serial port's driver buffers.
+const STREAM_BYTES: usize = 4096;
+/// The boot of a device that was just switched on.
+const FIRST_BOOT: u32 = 1;
+
+/// A simulated device that is switched on: every link leads to the same one.
+#[derive(Debug, Clone)]
+pub(crate) struct SimulatedDevice {
+    streams: mpsc::UnboundedSender<DuplexStream>,
+}
+
+impl SimulatedDevice {
+    /// Switches a device on, as a task of the current runtime; it goes by that runtime's clock.
+    pub(crate) fn switch_on(stage: &Stage, baud: u32) -> Self {
+        let (streams, mut waiting) = mpsc::unbounded_channel::<DuplexStream>();
+        let mut device = device(stage);
+        let wire = wire(stage, baud);
+        tokio::spawn(async move {
+            let boot = Instant::now();
+            while let Some(stream) = waiting.recv().await {
+                // A stream that ends is a host that left; the next one may come.
+                let _ = sim::serve(stream, &mut device, boot, wire.clone()).await;
+            }
+        });
+        Self { streams }
+    }
+
+    /// A link to it. The one before, if any, must have been dropped.
+    pub(crate) fn link(&self) -> Link {
+        let (host, device) = duplex(STREAM_BYTES);
+        // A device whose task has ended leaves the stream closed, which the driver notices.
+        let _ = self.streams.send(device);
+        Link::new("simulated rig", host)
+    }
+}
+
+fn device(stage: &Stage) -> Device<sim::SimulatedBoard> {
+    Device::new(sim::SimulatedBoard::new(Arc::clone(&stage.compiled), FIRST_BOOT))
+}
+
+fn wire(stage: &Stage, baud: u32) -> sim::Wire {
+    sim::Wire::new(baud).with_faults(stage.faults, stage.seed)
+}
+
+/// `gonio sim`: serves the device on a pseudo-terminal, in real time, until it is stopped.
+pub(crate) fn sim(args: &SimArgs) -> Outcome {
+    let mut inputs = Inputs::from_disk();
+    let path = args.rig.rig.clone().unwrap_or_else(|| BUILT_IN.into());
+    let rig = rig_at(&mut inputs, &path)?;
+    let scene = args.rig.scene.as_ref().ok_or_else(|| {
+        Failure::with_help(
+            "no scene to look at",
+            "give one with --scene, for example examples/luminaire/scene.toml",
+        )
+    })?;
+    let stage = stage_at(&mut inputs, scene, &rig, args.rig.seed)?;
+    let baud = args.baud.unwrap_or_else(|| rig.link.baud());
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+    runtime.block_on(serve_on_pty(args, &stage, baud))
+}
+
+async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
+    let cannot = |error: std::io::Error| {
+        let link =
+            args.pty.as_ref().map_or(String::new(), |link| format!(" at {}", link.display()));
+        Failure::start(format!("no pseudo-terminal{link}: {error}"))
+    };
+    let mut stop = StopSignals::new().map_err(cannot)?;
+    let pty = sim::Pty::open(args.pty.as_deref()).map_err(cannot)?;
+    let shown = args.pty.as_deref().unwrap_or(pty.path());
+    println!("{}", shown.display());
+    eprintln!("simulated rig at {baud} baud; Ctrl-C switches it off");
+    let mut device = device(stage);
+    tokio::select! {
+        biased;
+        () = stop.next() => Ok(ExitCode::SUCCESS),
+        served = sim::serve(pty, &mut device, Instant::now(), wire(stage, baud)) => match served {
+            Ok(()) => Ok(ExitCode::SUCCESS),
+            Err(error) => Err(Failure::midway(format!("the pseudo-terminal failed: {error}"))),
+        },
+    }
+}
+
+/// Ctrl-C and SIGTERM, counted from when this was made.
+#[derive(Debug)]
+pub(crate) struct StopSignals {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
+}
+
+impl StopSignals {
+    pub(crate) fn new() -> std::io::Result<Self> {
+        use tokio::signal::unix::{SignalKind, signal};
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+        })
+    }
+
+    /// The next of either.
+    pub(crate) async fn next(&mut self) {
+        tokio::select! {
+            biased;
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+    }
+}
