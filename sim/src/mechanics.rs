@@ -228,9 +228,11 @@ impl Axis {
         self.searched.filter(|(low, high)| (*low..=*high).contains(&mark)).map(|_| mark)
     }
 
+    /// It stands still on its mark: that it has settled there is the caller's word.
     pub(crate) fn set_home(&mut self) {
         self.origin_counts = self.mark_counts;
         self.setpoint_counts = 0.0;
+        self.behind_counts = 0.0;
         self.searched = None;
         self.homings += 1;
     }

@@ -12,6 +12,9 @@ use crate::wire::{Wire, Wired};
 /// What is read from the stream at a time, bytes.
 const READ_BYTES: usize = 512;
 
+/// What waits for a host that does not read; more is lost, as on a wire.
+const ARRIVED_BYTES_MAX: usize = 1 << 16;
+
 /// Serves the device over the stream, paced like the wire, until the stream ends. `boot` is when
 /// the device was switched on: its time zero. What it did between two streams it did at its own
 /// time: it can be served again.
@@ -38,7 +41,9 @@ where
         let now = clock.now();
         wired.advance(now);
         while let Some(bytes) = wired.receive(now) {
-            arrived.extend(bytes);
+            if arrived.len() < ARRIVED_BYTES_MAX {
+                arrived.extend(bytes);
+            }
         }
         // What the host writes faster than the wire carries waits in the stream.
         let is_open = wired.inward_free() <= now;

@@ -14,9 +14,23 @@ use tokio_serial::SerialStream;
 
 const RADIANCE: f64 = 40.0;
 
-fn rig(seed: u64) -> Arc<Compiled> {
+fn scene() -> Scene {
     let patch = Emitter::lambertian(Shape::rectangle(0.0, 0.0, 0.04, 0.04), RADIANCE);
-    compiled(Scene::new(Quantity::Radiance).with(patch).unwrap(), exact_rig(), seed)
+    Scene::new(Quantity::Radiance).with(patch).unwrap()
+}
+
+fn rig(seed: u64) -> Arc<Compiled> {
+    compiled(scene(), exact_rig(), seed)
+}
+
+/// For real time: its homing takes tenths of a second.
+fn quick_rig() -> Arc<Compiled> {
+    let mut nominal = exact_rig();
+    for axis in &mut nominal.axes {
+        axis.speed_counts_per_s *= 50;
+        axis.acceleration_counts_per_s2 *= 1000;
+    }
+    compiled(scene(), nominal, 5)
 }
 
 /// Identify, home, move, dwell in the light and in the dark. All readings, and how long it took.
@@ -118,7 +132,7 @@ async fn a_round_trip_takes_the_wires_time_and_a_tick() {
 
 #[tokio::test]
 async fn a_device_on_a_pseudo_terminal_keeps_its_home_between_clients() {
-    let rig = rig(5);
+    let rig = quick_rig();
     let mut device = device(&rig);
     let pty = Pty::open(None).unwrap();
     let path = pty.path().to_string_lossy().into_owned();
