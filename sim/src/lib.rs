@@ -3,7 +3,8 @@
 //!
 //! [`Scene`] says what emits, [`Nominal`] what the rig file states, [`Simulated`] what a real rig
 //! would keep to itself. [`compile()`] turns them and a seed into a [`Compiled`] rig: its rows of
-//! effects, its truth, and the [`SimulatedBoard`] that the device core drives.
+//! effects, its truth, and the [`SimulatedBoard`] that the device core drives. [`serve()`] puts a
+//! device on a byte stream paced like a [`Wire`], and [`Pty`] is such a stream for other programs.
 //!
 //! The crate does not know the host: not its kinematics, not its calibration, not its files. It
 //! computes from its own mechanical truth, so that a wrong sign on either side shows.
