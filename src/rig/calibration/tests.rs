@@ -312,7 +312,8 @@ fn the_fit_gets_the_usable_samples_and_what_they_share() {
     assert!(matches!(by_name("responsivity"), fit::Shift::Scale));
     let fit::Shift::Value(excess) = by_name("gain 100 nA") else { panic!("one range alone") };
     let u = rig.detector.gains[1].u_relative;
-    assert_eq!([0, 1, 2].map(|i| excess(i, 2.0)), [0.0, 2.0 * u, 0.0]);
+    assert_close(excess(1, 2.0), 2.0 * u);
+    assert!(excess(0, 2.0).abs() + excess(2, 2.0).abs() < f64::MIN_POSITIVE);
     let fit::Shift::Ray(seen) = by_name("x zero") else { panic!("an axis moves rays") };
     let sample = &input.samples[2];
     assert_close(seen(2, &sample.ray).x_m - sample.ray.x_m, rig.axes[2].u_zero);
