@@ -1,1 +1,26 @@
-//! Room `export`.
+//! Files for people and other tools: the run's CSV and JSON files, and CSV from elsewhere.
+//!
+//! Text is written alike whatever the locale: `.` as the decimal mark, the fewest digits that read
+//! back to the same f64, LF, UTF-8. A file is complete or it is not there ([`write_atomically`]).
+//!
+//! This room is handed readings, samples and fits. It does not know where they are kept, nor which
+//! folder they go to.
+
+mod accuracy;
+mod atomic;
+mod fit_file;
+mod input;
+mod number;
+mod readings;
+mod samples;
+mod samples_meta;
+#[cfg(test)]
+mod tests;
+
+pub use accuracy::{AccuracyPoint, write_accuracy};
+pub use atomic::{ExportError, write_atomically};
+pub use fit_file::{FitFile, TruePeak, Truth};
+pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};
+pub use readings::write_readings;
+pub use samples::{RayColumns, write_samples};
+pub use samples_meta::SamplesMeta;

@@ -1,0 +1,283 @@
+//! fit.json: what was fitted, how well, and on a simulated rig what is true.
+
+use std::io::{self, Write};
+
+use fit::{Estimate, Fit};
+use serde_json::{Map, Value, json};
+
+use crate::rig::Quantity;
+
+/// What fit.json says. Numbers that do not exist are `null`.
+#[derive(Debug, Clone, Copy)]
+pub struct FitFile<'a> {
+    /// The fit.
+    pub fit: &'a Fit,
+    /// What its values are.
+    pub quantity: Quantity,
+    /// Whether the samples come from a simulated rig.
+    pub simulated: bool,
+    /// Samples that carry a flag, used or not.
+    pub n_flagged: usize,
+    /// Samples that the fit left out on account of their flags.
+    pub n_excluded: usize,
+    /// What a reader must know, one sentence each: that the input's u counts as independent, say.
+    pub notes: &'a [String],
+    /// What is true, on a simulated rig.
+    pub truth: Option<Truth>,
+}
+
+/// What leaves a simulated sample, by the definitions of the fit's own quantities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Into the whole hemisphere, mean over the region.
+    pub exitance: f64,
+    /// Into the region's directions alone.
+    pub exitance_within_region: f64,
+    /// From the region.
+    pub flux: f64,
+    /// The largest radiance within the region; `None` where it has no bound.
+    pub peak: Option<TruePeak>,
+    /// Throughput-weighted RMS of fitted less true radiance within the region, divided by that of
+    /// the true one.
+    pub radiance_error_rms_relative: f64,
+}
+
+/// The largest radiance within the region, and where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TruePeak {
+    /// The radiance.
+    pub value: f64,
+    /// Where.
+    pub ray: fit::Ray,
+}
+
+impl FitFile<'_> {
+    /// Writes it: one key a line, the covariance one row a line.
+    pub fn write(&self, mut out: impl Write) -> io::Result<()> {
+        let object = self.object();
+        let last = object.len().saturating_sub(1);
+        out.write_all(b"{\n")?;
+        for (i, (key, value)) in object.iter().enumerate() {
+            write!(out, "  {}: ", Value::from(key.as_str()))?;
+            match value {
+                Value::Array(rows) if rows.iter().any(Value::is_array) => {
+                    write_rows(&mut out, rows)?;
+                }
+                value => write!(out, "{value}")?,
+            }
+            out.write_all(if i < last { b",\n" } else { b"\n" })?;
+        }
+        out.write_all(b"}\n")
+    }
+
+    fn object(&self) -> Map<String, Value> {
+        let Self { fit, quantity, .. } = self;
+        let region = fit.region();
+        let mut object = Map::new();
+        let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+        put("quantity", json!(quantity.name()));
+        put("simulated", json!(self.simulated));
+        put(
+            "basis",
+            json!({
+                "kind": "Zernike on the Nusselt disk times Legendre in x and y",
+                "angular_degree": fit.basis().angular_degree,
+                "position_degree": fit.basis().position_degree,
+                "functions": fit.names(),
+            }),
+        );
+        put(
+            "region",
+            json!({
+                "x_mm": [region.x_m.0 * 1e3, region.x_m.1 * 1e3],
+                "y_mm": [region.y_m.0 * 1e3, region.y_m.1 * 1e3],
+                "theta_max_deg": region.theta_max_rad.to_degrees(),
+            }),
+        );
+        put("coefficients", json!(fit.coefficients()));
+        put("covariance", json!(fit.covariance()));
+        put("condition", json!(fit.condition()));
+        put("residual_rms", json!(fit.residual_rms()));
+        put("excess_rms", json!(fit.excess_rms()));
+        put("chi2", json!(fit.chi2()));
+        put("dof", json!(fit.dof()));
+        put("n_used", json!(fit.n_used()));
+        put("n_flagged", json!(self.n_flagged));
+        put("n_excluded", json!(self.n_excluded));
+        put("notes", json!(self.notes));
+        put("uncertainty_budget_exitance", self.budget());
+        self.put_derived(&mut object);
+        if let Some(truth) = self.truth {
+            object.insert("truth".to_owned(), self.truth(truth));
+            object.insert(
+                "radiance_error_rms_relative".to_owned(),
+                json!(truth.radiance_error_rms_relative),
+            );
+        }
+        object
+    }
+
+    fn put_derived(&self, object: &mut Map<String, Value>) {
+        let Self { fit, quantity, .. } = self;
+        let mut exitance = estimate(fit.exitance());
+        exitance["measured_fraction"] = json!(fit.measured_fraction());
+        object.insert(quantity.exitance_key().to_owned(), exitance);
+        // The region's cone lies within the hemisphere, so that it has an exitance.
+        let within = fit.exitance_within(fit.region().theta_max_rad).map_or(Value::Null, estimate);
+        object.insert(quantity.exitance_within_region_key().to_owned(), within);
+        object.insert(quantity.flux_key().to_owned(), estimate(fit.flux()));
+        let peak = fit.peak();
+        let mut at = at(peak.ray);
+        at["value"] = json!(peak.radiance.value);
+        at["u"] = json!(peak.radiance.u);
+        at["u_independent"] = json!(peak.radiance.u_independent);
+        object.insert(quantity.peak_key().to_owned(), at);
+    }
+
+    fn budget(&self) -> Value {
+        let rows = self.fit.contributions();
+        rows.iter().map(|row| json!({"name": row.name, "u": row.u})).collect()
+    }
+
+    fn truth(&self, truth: Truth) -> Value {
+        let quantity = self.quantity;
+        let is_bright = truth.exitance > 0.0;
+        let fraction = is_bright.then(|| truth.exitance_within_region / truth.exitance);
+        let peak = truth.peak.map_or(Value::Null, |peak| {
+            let mut at = at(peak.ray);
+            at["value"] = json!(peak.value);
+            at
+        });
+        json!({
+            quantity.exitance_key(): {"value": truth.exitance, "measured_fraction": fraction},
+            quantity.exitance_within_region_key(): {"value": truth.exitance_within_region},
+            quantity.flux_key(): {"value": truth.flux},
+            quantity.peak_key(): peak,
+            "radiance_error_rms_relative": truth.radiance_error_rms_relative,
+        })
+    }
+}
+
+fn estimate(Estimate { value, u, u_independent }: Estimate) -> Value {
+    json!({"value": value, "u": u, "u_independent": u_independent})
+}
+
+fn at(ray: fit::Ray) -> Value {
+    json!({
+        "x_mm": ray.x_m * 1e3,
+        "y_mm": ray.y_m * 1e3,
+        "theta_deg": ray.theta_rad.to_degrees(),
+        "phi_deg": ray.phi_rad.to_degrees(),
+    })
+}
+
+fn write_rows(out: &mut impl Write, rows: &[Value]) -> io::Result<()> {
+    out.write_all(b"[")?;
+    for (i, row) in rows.iter().enumerate() {
+        write!(out, "{}\n    {row}", if i > 0 { "," } else { "" })?;
+    }
+    out.write_all(b"\n  ]")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
+    use std::f64::consts::PI;
+
+    fn lambertian() -> Fit {
+        let ray = |i: u32| Ray {
+            x_m: 0.0,
+            y_m: 0.0,
+            theta_rad: f64::from(i % 8) * 0.2,
+            phi_rad: f64::from(i / 8) * 2.1,
+        };
+        let noise = Noise::Fixed { variance: 0.01 };
+        let samples: Vec<Sample> =
+            (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
+        let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+        let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+        let scale = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
+        fit::fit(&samples, &region, basis, &[scale]).unwrap()
+    }
+
+    fn written(file: &FitFile<'_>) -> Value {
+        let mut text = Vec::new();
+        file.write(&mut text).unwrap();
+        serde_json::from_slice(&text).unwrap()
+    }
+
+    #[test]
+    fn it_holds_what_the_contract_names() {
+        let fit = lambertian();
+        let notes = ["the input's u counts as independent".to_owned()];
+        let ray = Ray { x_m: 0.0, y_m: 0.001, theta_rad: 0.0, phi_rad: 0.0 };
+        let truth = Truth {
+            exitance: 100.0 * PI,
+            exitance_within_region: 305.0,
+            flux: 0.04 * PI,
+            peak: Some(TruePeak { value: 100.0, ray }),
+            radiance_error_rms_relative: 1e-3,
+        };
+        let quantity = Quantity::Radiance;
+        let file = FitFile {
+            fit: &fit,
+            quantity,
+            simulated: true,
+            n_flagged: 3,
+            n_excluded: 1,
+            notes: &notes,
+            truth: Some(truth),
+        };
+        let json = written(&file);
+        let number = |path: &str| json.pointer(path).and_then(Value::as_f64).expect(path);
+        assert!((number("/exitance_w_per_m2/value") - 100.0 * PI).abs() < 1e-9);
+        assert!(number("/exitance_w_per_m2/u") > 2.0 * PI);
+        assert!((0.9..1.0).contains(&number("/exitance_w_per_m2/measured_fraction")));
+        assert!((number("/flux_w/value") - 0.04 * PI).abs() < 1e-12);
+        assert!(number("/exitance_within_region_w_per_m2/u") > 0.0);
+        assert!((number("/peak_radiance/value") - 100.0).abs() < 1e-9);
+        for key in ["x_mm", "y_mm", "theta_deg", "phi_deg", "u"] {
+            number(&format!("/peak_radiance/{key}"));
+        }
+        for key in ["condition", "residual_rms", "dof", "n_used", "n_flagged"] {
+            number(&format!("/{key}"));
+        }
+        assert_eq!(number("/truth/exitance_w_per_m2/value").to_bits(), (100.0 * PI).to_bits());
+        assert_eq!(number("/truth/peak_radiance/y_mm").to_bits(), 1.0_f64.to_bits());
+        assert_eq!(number("/truth/radiance_error_rms_relative").to_bits(), 1e-3_f64.to_bits());
+        assert_eq!(json["notes"][0], notes[0].as_str());
+
+        // Numbers come back to the last bit.
+        let covariance = fit.covariance();
+        for (i, row) in covariance.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                let read = number(&format!("/covariance/{i}/{j}"));
+                assert_eq!(read.to_bits(), value.to_bits());
+            }
+        }
+        assert_eq!(json["coefficients"].as_array().unwrap().len(), covariance.len());
+    }
+
+    #[test]
+    fn photometric_and_relative_fits_carry_no_radiometric_name() {
+        let fit = lambertian();
+        for quantity in [Quantity::Luminance, Quantity::Relative] {
+            let file = FitFile {
+                fit: &fit,
+                quantity,
+                simulated: false,
+                n_flagged: 0,
+                n_excluded: 0,
+                notes: &[],
+                truth: None,
+            };
+            let json = written(&file);
+            let object = json.as_object().unwrap();
+            assert!(object.contains_key(quantity.exitance_key()));
+            assert!(!object.contains_key("truth"));
+            let radiometric = object.keys().find(|key| key.contains("_w_") || key.ends_with("_w"));
+            assert_eq!(radiometric, None);
+        }
+    }
+}
