@@ -79,7 +79,7 @@ fn mechanics(compiled: &Compiled) -> Vec<EffectRow> {
             "drawn for each count of the scale by the seed",
         );
         let resolution = 0.5 / axis.counts_per_unit.abs();
-        let cause = format!("axes.{name}: counts, and a readback");
+        let cause = format!("axes.{name}.counts_per_{key} and readback");
         let how = if axis.has_encoder {
             "the position, rounded to a count"
         } else {
@@ -148,7 +148,7 @@ fn currents(compiled: &Compiled) -> Vec<EffectRow> {
         row(
             "dark current",
             has_dark,
-            format!("simulated.dark_current_a = {dark_a}"),
+            format!("simulated.dark_current_a = {dark_a:e}"),
             Some((dark_a.abs(), BoundUnit::Ampere)),
             not(has_dark, "added to the light's current, shutter open or closed"),
         ),
@@ -162,7 +162,7 @@ fn currents(compiled: &Compiled) -> Vec<EffectRow> {
         row(
             "read noise",
             d.read_noise_a > 0.0,
-            format!("detector.read_noise_a = {}", d.read_noise_a),
+            format!("detector.read_noise_a = {:e}", d.read_noise_a),
             Some((d.read_noise_a, BoundUnit::Ampere)),
             not(
                 d.read_noise_a > 0.0,
