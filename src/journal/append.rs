@@ -57,12 +57,14 @@ impl Journal {
             .create_new(true)
             .open(path)
             .map_err(|error| JournalError::io(path, "create", &error))?;
-        let mut connection = schema::connect(path)?;
-        fill(&mut connection, header, inputs, steps)
-            .map_err(|error| JournalError::sqlite(path, "write the header", &error))?;
-        schema::make_durable(path, &connection)?;
-        sync_folder_of(path)?;
-        Ok(Self { reader: Reader::new(path, connection), _lock: lock })
+        match begin(path, header, inputs, steps) {
+            Ok(connection) => Ok(Self { reader: Reader::new(path, connection), _lock: lock }),
+            Err(error) => {
+                // Ours, made a moment ago, and without a run in it.
+                let _ = std::fs::remove_file(path);
+                Err(error)
+            }
+        }
     }
 
     /// Opens an interrupted run's file to carry it on; every page is checked first.
@@ -231,6 +233,20 @@ pub(super) fn kind_columns(kind: ReadingKind) -> (&'static str, Option<u32>, Opt
         ReadingKind::WarmUp => ("warm_up", None, None),
         ReadingKind::Target { index, repeat } => ("target", Some(index), Some(repeat)),
     }
+}
+
+fn begin(
+    path: &Path,
+    header: &Header,
+    inputs: &[Input],
+    steps: &[Step],
+) -> Result<Connection, JournalError> {
+    let mut connection = schema::connect(path)?;
+    fill(&mut connection, header, inputs, steps)
+        .map_err(|error| JournalError::sqlite(path, "write the header", &error))?;
+    schema::make_durable(path, &connection)?;
+    sync_folder_of(path)?;
+    Ok(connection)
 }
 
 /// Everything in one transaction, still under the rollback journal: a kill leaves an empty file.

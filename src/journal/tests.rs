@@ -230,6 +230,15 @@ fn an_existing_file_is_never_overwritten() {
 }
 
 #[test]
+fn a_journal_that_cannot_be_begun_leaves_nothing() {
+    let folder = Folder::new();
+    let twice = [steps(), steps()].concat();
+    let error = Journal::create(&folder.path(), &header(), &[], &twice).unwrap_err();
+    assert!(error.to_string().contains("write the header: UNIQUE constraint"), "{error}");
+    assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 0);
+}
+
+#[test]
 fn one_process_appends_and_others_read_meanwhile() {
     let folder = Folder::new();
     let mut journal = folder.journal();
