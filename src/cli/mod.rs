@@ -3,11 +3,14 @@
 
 mod args;
 mod explain;
+mod export;
 mod failure;
+mod fit;
 mod inputs;
 mod nominal;
 mod plan;
 mod ports;
+mod results;
 mod session;
 mod setup;
 mod simulated;
@@ -26,6 +29,8 @@ pub fn main() -> ExitCode {
         Command::Explain(args) => explain::explain(&args),
         Command::Sim(args) => simulated::sim(&args),
         Command::Ports(args) => ports::ports(&args),
+        Command::Fit(args) => fit::fit(&args),
+        Command::Export(args) => export::export(&args),
         Command::Plan(args) => plan::plan(&args),
         _ => Err(Failure::start("not in this build")),
     };

@@ -1,0 +1,28 @@
+//! `gonio export`: a run's samples in another form, made from its journal.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use super::args::{ExportArgs, ExportFormat};
+use super::failure::{Failure, Outcome};
+use super::results::{Results, read_run};
+use crate::export::{write_atomically, write_samples};
+
+/// Writes the samples to a file, or to standard output.
+pub(crate) fn export(args: &ExportArgs) -> Outcome {
+    let (setup, _, readings) = read_run(&args.dir)?;
+    let results = Results::of(&setup, setup.plan.fit, &readings)?;
+    let (quantity, samples) = (setup.rig.detector.quantity, &results.calibrated.samples);
+    let ExportFormat::Csv = args.format;
+    match args.output.as_deref().filter(|path| *path != Path::new("-")) {
+        Some(path) => write_atomically(path, |out| write_samples(out, quantity, samples))
+            .map_err(Failure::midway)?,
+        None => match write_samples(std::io::stdout().lock(), quantity, samples) {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                return Err(Failure::midway(format!("standard output: {error}")));
+            }
+            _ => {}
+        },
+    }
+    Ok(ExitCode::SUCCESS)
+}

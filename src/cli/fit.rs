@@ -1,0 +1,181 @@
+//! `gonio fit`: fits again, from a run's journal or from any CSV of samples, and evaluates the
+//! fit at listed rays.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+use fit::{BasisSpec, Fit, Region};
+
+use super::args::FitArgs;
+use super::failure::{Failure, Outcome};
+use super::results::{Results, read_run};
+use super::text::{percent, table, with_uncertainty};
+use crate::export::{FitFile, InputSamples, read_rays, read_samples, write_at, write_atomically};
+use crate::plan::FitSpec;
+use crate::rig::Quantity;
+
+/// The degrees for a CSV, where the command line does not say.
+const ANGULAR_DEGREE: usize = 6;
+const POSITION_DEGREE: usize = 0;
+/// A region's cone ends this far beyond the outermost sample of a CSV at most.
+const THETA_MAX_RAD: f64 = core::f64::consts::FRAC_PI_2;
+/// A larger CSV is not what a rig makes: 2 GiB.
+const CSV_BYTES_MAX: u64 = 2 << 30;
+
+/// Fits again and prints what came out.
+pub(crate) fn fit(args: &FitArgs) -> Outcome {
+    if args.source.is_dir() { fit_run(args) } else { fit_csv(args) }
+}
+
+fn fit_run(args: &FitArgs) -> Outcome {
+    if args.u_relative.is_some() {
+        return Err(Failure::with_help(
+            "--u-relative: a run's samples have uncertainties of their own",
+            "leave it out; it is for a CSV without a column of uncertainties",
+        ));
+    }
+    let (setup, _, readings) = read_run(&args.source)?;
+    let spec = FitSpec {
+        angular_degree: args.angular_degree.unwrap_or(setup.plan.fit.angular_degree),
+        position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
+    };
+    let results = Results::of(&setup, spec, &readings)?;
+    let fitted =
+        results.fitted.as_ref().map_err(|error| Failure::midway(format!("fit: {error}")))?;
+    let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
+    results.write_fit(&path, &setup, fitted).map_err(Failure::midway)?;
+    let file = FitFile {
+        fit: &fitted.fit,
+        quantity: setup.rig.detector.quantity,
+        simulated: setup.rig.is_simulated(),
+        n_flagged: results.n_flagged(),
+        n_excluded: fitted.n_excluded,
+        notes: &[],
+        truth: results.truth,
+    };
+    show(args, &file)
+}
+
+fn fit_csv(args: &FitArgs) -> Outcome {
+    let shown = args.source.display();
+    let bytes = read_csv(&args.source)?;
+    let input =
+        read_samples(&bytes).map_err(|error| Failure::start(format!("{shown}: {error}")))?;
+    if let Some(u) = args.u_relative
+        && !(u > 0.0 && u.is_finite())
+    {
+        return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
+    }
+    let region = region_of(&input);
+    let basis = BasisSpec {
+        angular_degree: args.angular_degree.unwrap_or(ANGULAR_DEGREE),
+        position_degree: args.position_degree.unwrap_or(POSITION_DEGREE),
+    };
+    let samples = input.fit_samples(args.u_relative);
+    let fit = fit::fit(&samples, &region, basis, &[])
+        .map_err(|error| Failure::start(format!("{shown}: {error}")))?;
+    let notes = [note_on_u(&input, args.u_relative)];
+    let file = FitFile {
+        fit: &fit,
+        quantity: input.quantity,
+        simulated: false,
+        n_flagged: input.flagged(),
+        n_excluded: input.samples.len() - samples.len(),
+        notes: &notes,
+        truth: None,
+    };
+    if let Some(path) = &args.output {
+        write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+    }
+    show(args, &file)
+}
+
+fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
+    match (input.has_u(), u_relative) {
+        (true, _) => {
+            "the input's uncertainties count as independent from sample to sample".to_owned()
+        }
+        (false, Some(u)) => {
+            format!("each sample counts with u = {u} of the input's RMS, independent")
+        }
+        (false, None) => {
+            "the input has no uncertainties: they are taken from the residuals, independent"
+                .to_owned()
+        }
+    }
+}
+
+/// The rectangle and the cone that hold all samples.
+fn region_of(input: &InputSamples) -> Region {
+    let extent = |value: fn(&fit::Ray) -> f64| {
+        let values = input.samples.iter().map(|sample| value(&sample.ray.ray()));
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (_, theta_max_rad) = extent(|ray| ray.theta_rad);
+    Region {
+        x_m: extent(|ray| ray.x_m),
+        y_m: extent(|ray| ray.y_m),
+        theta_max_rad: theta_max_rad.clamp(f64::MIN_POSITIVE, THETA_MAX_RAD),
+    }
+}
+
+fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
+    let shown = path.display();
+    let cannot = |error: std::io::Error| {
+        Failure::with_help(
+            format!("{shown}: cannot be read: {error}"),
+            "expected a run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance",
+        )
+    };
+    let size = std::fs::metadata(path).map_err(cannot)?.len();
+    if size > CSV_BYTES_MAX {
+        return Err(Failure::start(format!(
+            "{shown}: {size} bytes; expected at most {CSV_BYTES_MAX}"
+        )));
+    }
+    std::fs::read(path).map_err(cannot)
+}
+
+/// Prints the fit: at listed rays where those are asked for, as JSON, or as a table.
+fn show(args: &FitArgs, file: &FitFile<'_>) -> Outcome {
+    let out = std::io::stdout().lock();
+    let written = if let Some(path) = &args.at {
+        let rays = read_rays(&read_csv(path)?)
+            .map_err(|error| Failure::start(format!("{}: {error}", path.display())))?;
+        write_at(out, file.quantity, rays.into_iter().map(|r| (r, file.fit.radiance(&r.ray()))))
+    } else if args.json {
+        file.write(out)
+    } else {
+        let mut out = out;
+        out.write_all(summary(file.fit, file.quantity, file.notes).as_bytes())
+    };
+    match written {
+        // Whoever read it has read enough.
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::midway(format!("standard output: {error}")))
+        }
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn summary(fit: &Fit, quantity: Quantity, notes: &[String]) -> String {
+    let [_, exitance_unit, flux_unit] = quantity.units();
+    let (exitance, flux) = (fit.exitance(), fit.flux());
+    let measured = fit.measured_fraction().map_or("unknown".to_owned(), percent);
+    let mut rows = vec![
+        row("samples used", fit.n_used().to_string()),
+        row("coefficients", fit.coefficients().len().to_string()),
+        row("condition", format!("{:.1}", fit.condition())),
+        row("residual RMS", format!("{:.3e}", fit.residual_rms())),
+        row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)),
+        row("  of it measured", measured),
+        row("flux", with_uncertainty(flux.value, flux.u, flux_unit)),
+    ];
+    rows.extend(notes.iter().map(|note| row("note", note.clone())));
+    table(&rows)
+}
+
+fn row(name: &str, value: String) -> Vec<String> {
+    vec![name.to_owned(), value]
+}

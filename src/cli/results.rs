@@ -1,0 +1,211 @@
+//! From a run's readings to what it says: samples, fit, what is true on a simulated rig, the
+//! course of its accuracy; and the files of its folder. A run that just ended, one that is fitted
+//! again, one of a ladder and one of the daemon's all come through here.
+
+use std::path::Path;
+
+use fit::{BasisSpec, FitError, Region};
+
+use super::failure::Failure;
+use super::setup::Setup;
+use crate::export::{
+    AccuracyPoint, ExportError, FitFile, SamplesMeta, TruePeak, Truth, write_accuracy,
+    write_atomically, write_readings, write_samples,
+};
+use crate::journal::{Header, InputRole, Order, Reader};
+use crate::plan::FitSpec;
+use crate::rig::Reading;
+use crate::rig::calibration::{Calibrated, Fitted, calibrate};
+use crate::study::radiance_error_rms_relative;
+
+/// Points of the accuracy curve at most: each is a fit of its own.
+const ACCURACY_POINTS: u32 = 12;
+
+/// What a run says.
+#[derive(Debug)]
+pub(crate) struct Results {
+    pub(crate) calibrated: Calibrated,
+    /// The fit, or why there is none.
+    pub(crate) fitted: Result<Fitted, FitError>,
+    pub(crate) truth: Option<Truth>,
+    pub(crate) accuracy: Vec<AccuracyPoint>,
+}
+
+impl Results {
+    /// Calibrates and fits a run's readings. An error is one of the readings; a fit that is not
+    /// possible is a result too, since the samples stand.
+    pub(crate) fn of(setup: &Setup, spec: FitSpec, readings: &[Reading]) -> Result<Self, Failure> {
+        let mut calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
+        let (region, basis) = (fit_region(setup), basis(spec));
+        let fitted = calibrated.fit(&region, basis);
+        if let Ok(fitted) = &fitted {
+            calibrated.restate_from(&fitted.fit);
+        }
+        let truth = fitted.as_ref().ok().and_then(|fitted| truth(setup, &region, fitted));
+        let accuracy = accuracy(&calibrated, &region, basis);
+        Ok(Self { calibrated, fitted, truth, accuracy })
+    }
+
+    /// Samples that carry a flag.
+    pub(crate) fn n_flagged(&self) -> usize {
+        self.calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count()
+    }
+
+    /// Writes every file of the run's folder but the journal, each whole or not at all.
+    pub(crate) fn write(
+        &self,
+        folder: &Path,
+        setup: &Setup,
+        header: &Header,
+        readings: &[Reading],
+    ) -> Result<(), Failure> {
+        self.write_files(folder, setup, header, readings).map_err(Failure::midway)
+    }
+
+    fn write_files(
+        &self,
+        folder: &Path,
+        setup: &Setup,
+        header: &Header,
+        readings: &[Reading],
+    ) -> Result<(), ExportError> {
+        let quantity = setup.rig.detector.quantity;
+        write_atomically(&folder.join("samples.csv"), |out| {
+            write_samples(out, quantity, &self.calibrated.samples)
+        })?;
+        let meta = SamplesMeta {
+            rig: &setup.rig,
+            calibrated: &self.calibrated,
+            program_version: &header.program_version,
+            simulated: header.simulated,
+            seed: header.seed,
+            plan_name: &header.plan_name,
+            plan_hash: &header.plan_hash,
+            started_utc: &header.started_utc,
+            targets_planned: targets_planned(setup),
+            effects: &header.effects,
+        };
+        write_atomically(&folder.join("samples.meta.json"), |out| meta.write(out))?;
+        write_atomically(&folder.join("readings.csv"), |out| {
+            write_readings(out, &setup.rig, readings.iter().cloned())
+        })?;
+        write_atomically(&folder.join("accuracy.csv"), |out| {
+            write_accuracy(out, quantity, &self.accuracy)
+        })?;
+        if let Ok(fitted) = &self.fitted {
+            self.write_fit(&folder.join("fit.json"), setup, fitted)?;
+        }
+        Ok(())
+    }
+
+    /// Writes fit.json.
+    pub(crate) fn write_fit(
+        &self,
+        path: &Path,
+        setup: &Setup,
+        fitted: &Fitted,
+    ) -> Result<(), ExportError> {
+        let file = FitFile {
+            fit: &fitted.fit,
+            quantity: setup.rig.detector.quantity,
+            simulated: setup.rig.is_simulated(),
+            n_flagged: self.n_flagged(),
+            n_excluded: fitted.n_excluded,
+            notes: &[],
+            truth: self.truth,
+        };
+        write_atomically(path, |out| file.write(out))
+    }
+}
+
+/// Copies of plan, rig and scene and of what they refer to, as they were read.
+pub(crate) fn write_inputs(folder: &Path, setup: &Setup) -> Result<(), ExportError> {
+    for input in &setup.inputs {
+        let name = match input.role {
+            InputRole::Plan => "plan.toml",
+            InputRole::Rig => "rig.toml",
+            InputRole::Scene => "scene.toml",
+            // The name alone: a file of another folder is copied into this one.
+            InputRole::Attachment => match Path::new(&input.name).file_name() {
+                Some(name) => &*name.to_string_lossy(),
+                None => continue,
+            },
+        };
+        write_atomically(&folder.join(name), |out| out.write_all(&input.bytes))?;
+    }
+    Ok(())
+}
+
+/// Reads a run's folder: what it is made of, how it began, and its readings so far.
+pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), Failure> {
+    let reader = Reader::open(&folder.join("run.sqlite"))?;
+    let header = reader.header()?;
+    let name = Some(header.plan_name.clone());
+    let setup = Setup::from_inputs(reader.inputs()?, name, header.seed)?;
+    let readings = reader.readings(Order::Taken)?;
+    Ok((setup, header, readings))
+}
+
+/// Readings of targets that the plan asks for, repeats counted.
+pub(crate) fn targets_planned(setup: &Setup) -> usize {
+    setup.sequence.targets.len() * setup.plan.repeat as usize
+}
+
+fn fit_region(setup: &Setup) -> Region {
+    let region = setup.region();
+    Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad }
+}
+
+fn basis(spec: FitSpec) -> BasisSpec {
+    BasisSpec { angular_degree: spec.angular_degree, position_degree: spec.position_degree }
+}
+
+fn truth(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<Truth> {
+    let truth = setup.truth()?;
+    let radiance = |ray: &fit::Ray| truth.radiance(ray.x_m, ray.y_m, ray.theta_rad, ray.phi_rad);
+    let error = radiance_error_rms_relative(region, |ray| fitted.fit.value(ray), radiance);
+    Some(Truth {
+        exitance: truth.exitance(),
+        exitance_within_region: truth.exitance_within_region(),
+        flux: truth.flux(),
+        peak: truth.peak().map(|peak| TruePeak {
+            value: peak.value,
+            ray: fit::Ray {
+                x_m: peak.x_m,
+                y_m: peak.y_m,
+                theta_rad: peak.theta_rad,
+                phi_rad: peak.phi_rad,
+            },
+        }),
+        // A sample without any light has no relative error; a fit that is dark too has none.
+        radiance_error_rms_relative: error.unwrap_or(0.0),
+    })
+}
+
+/// Fits of the first readings, ever more of them: half as many for each point further back.
+fn accuracy(calibrated: &Calibrated, region: &Region, basis: BasisSpec) -> Vec<AccuracyPoint> {
+    let total = calibrated.samples.len();
+    let mut counts: Vec<usize> = (0..ACCURACY_POINTS)
+        .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
+        // Between zero and the count of samples.
+        .map(|count| {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let count = count as usize;
+            count
+        })
+        .collect();
+    counts.sort_unstable();
+    counts.dedup();
+    let point = |count: usize| {
+        let known = calibrated.first(count);
+        let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
+        let fit = known.fit(region, basis).ok()?.fit;
+        Some(AccuracyPoint {
+            rig_s: last.fold(0.0, f64::max),
+            readings: count as u64,
+            exitance: fit.exitance(),
+            flux: fit.flux(),
+        })
+    };
+    counts.into_iter().filter_map(point).collect()
+}
