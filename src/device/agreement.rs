@@ -7,6 +7,9 @@ use crate::rig::{AxisName, Rig};
 /// Speeds and accelerations may differ by this much: a file rounds, and plans stay truthful.
 const RATE_TOLERANCE: f64 = 0.01;
 
+/// The commands of one step: to its run-up point, to its pose, dwell. A device queues as many.
+pub const QUEUE_DEPTH_MIN: usize = 3;
+
 /// What the device says and rig.toml says otherwise. Correct the file, or plug in the other rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Disagreement {
@@ -24,6 +27,14 @@ pub enum Disagreement {
         /// The file's.
         expected_hz: u32,
     },
+    /// Another number of axes: a move names the targets of all of them.
+    #[error("the device has {found} axes, rig.toml has {expected}")]
+    Axes {
+        /// The device's.
+        found: usize,
+        /// The file's.
+        expected: usize,
+    },
     /// No such channel on the device.
     #[error("{}: channel {channel} in rig.toml, but the device has {count} axes", axis.name())]
     Channel {
@@ -40,6 +51,14 @@ pub enum Disagreement {
         /// The device's.
         found: u8,
         /// The file's.
+        expected: usize,
+    },
+    /// Too short a queue to measure with.
+    #[error("the device queues {found} commands, at least {expected} are needed")]
+    Queue {
+        /// The device's.
+        found: u8,
+        /// What a step takes.
         expected: usize,
     },
     /// Another speed or acceleration: predictions would be wrong.
@@ -75,6 +94,14 @@ pub fn check_agreement(identity: &Identity, rig: &Rig) -> Result<(), Disagreemen
             count: identity.axes.len(),
         })?;
         check_axis(axis, *device)?;
+    }
+    if identity.axes.len() != rig.axes.len() {
+        let (found, expected) = (identity.axes.len(), rig.axes.len());
+        return Err(Disagreement::Axes { found, expected });
+    }
+    if usize::from(identity.queue_depth) < QUEUE_DEPTH_MIN {
+        let (found, expected) = (identity.queue_depth, QUEUE_DEPTH_MIN);
+        return Err(Disagreement::Queue { found, expected });
     }
     let detector = &rig.detector;
     if usize::from(identity.gains) != detector.gains.len() {

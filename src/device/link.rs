@@ -6,6 +6,8 @@ use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
+use super::SerialError;
+
 trait ByteStream: AsyncRead + AsyncWrite + Send {}
 
 impl<S: AsyncRead + AsyncWrite + Send> ByteStream for S {}
@@ -26,6 +28,21 @@ impl Link {
     pub fn name(&self) -> &str {
         &self.name
     }
+}
+
+/// A link that is being opened.
+pub type Opening = Pin<Box<dyn Future<Output = Result<Link, SerialError>> + Send>>;
+
+/// Opens the link to one device, as often as it is asked to: after a lost one too.
+pub type Opener = Box<dyn FnMut() -> Opening + Send>;
+
+/// Makes an [`Opener`] of a closure.
+pub fn opener<F, O>(mut open: F) -> Opener
+where
+    F: FnMut() -> O + Send + 'static,
+    O: Future<Output = Result<Link, SerialError>> + Send + 'static,
+{
+    Box::new(move || Box::pin(open()))
 }
 
 impl std::fmt::Debug for Link {

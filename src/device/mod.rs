@@ -9,8 +9,8 @@ mod native;
 mod ports;
 mod serial;
 
-pub use agreement::{Disagreement, check_agreement};
-pub use link::Link;
+pub use agreement::{Disagreement, QUEUE_DEPTH_MIN, check_agreement};
+pub use link::{Link, Opener, Opening, opener};
 pub use native::{ConnectError, DeviceEvent, LinkLost, Native};
 pub use ports::{PortEntry, list_ports};
-pub use serial::{SerialError, SerialSettings, open_serial};
+pub use serial::{SerialError, SerialSettings, open_serial, serial_opener};

