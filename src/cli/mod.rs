@@ -14,6 +14,7 @@ mod results;
 mod session;
 mod setup;
 mod simulated;
+mod summary;
 mod text;
 
 use std::process::ExitCode;

@@ -1,0 +1,143 @@
+//! The last thing that a run prints: what was measured, in which time, with which uncertainty,
+//! and on a simulated rig how far from the truth.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::results::{Results, targets_planned};
+use super::setup::Setup;
+use super::text::{duration, percent, table, with_uncertainty};
+use crate::rig::calibration::Flag;
+
+/// What a summary says beside the results.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Summary<'a> {
+    pub(crate) folder: &'a Path,
+    pub(crate) setup: &'a Setup,
+    pub(crate) results: &'a Results,
+    /// Why the run ended, in a word.
+    pub(crate) outcome: &'a str,
+    pub(crate) rig_s: f64,
+    pub(crate) wall_s: f64,
+}
+
+impl Summary<'_> {
+    /// For a terminal.
+    pub(crate) fn text(&self) -> String {
+        let Self { setup, results, .. } = self;
+        let simulated = if setup.rig.is_simulated() { " (simulated)" } else { "" };
+        let (measured, planned) = self.targets();
+        let mut rows = vec![
+            row("run", format!("{}{simulated}: {}", setup.plan_name, self.outcome)),
+            row("targets", format!("{measured} of {planned} measured")),
+            row("time in rig", duration(self.rig_s)),
+            row("time on the clock", duration(self.wall_s)),
+        ];
+        let flags = self.flags();
+        if !flags.is_empty() {
+            let list: Vec<String> = flags.iter().map(|(flag, n)| format!("{n} {flag}")).collect();
+            rows.push(row("flags", list.join(", ")));
+        }
+        if let Some(drift) = results.calibrated.drift() {
+            let spread = percent(drift.spread / drift.mean.abs());
+            rows.push(row("reference", format!("{} readings within {spread}", drift.readings)));
+        }
+        rows.extend(self.fit_rows());
+        rows.push(row("folder", self.folder.display().to_string()));
+        table(&rows)
+    }
+
+    fn fit_rows(&self) -> Vec<Vec<String>> {
+        let fitted = match &self.results.fitted {
+            Ok(fitted) => fitted,
+            Err(error) => return vec![row("fit", format!("none: {error}"))],
+        };
+        let fit = &fitted.fit;
+        let [_, exitance_unit, flux_unit] = self.setup.rig.detector.quantity.units();
+        let (exitance, flux) = (fit.exitance(), fit.flux());
+        let mut rows = vec![
+            row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)),
+            row("flux", with_uncertainty(flux.value, flux.u, flux_unit)),
+        ];
+        if exitance.value > 0.0 {
+            let independent = percent(exitance.u_independent / exitance.value);
+            let whole = percent(exitance.u / exitance.value);
+            rows.push(row(
+                "u, relative",
+                format!("{whole}, of it {independent} not shared by all readings"),
+            ));
+        }
+        if let Some(fraction) = fit.measured_fraction() {
+            rows.push(row("of it measured", percent(fraction)));
+        }
+        if let Some(truth) = &self.results.truth {
+            let error = exitance.value - truth.exitance;
+            let relative = percent(error / truth.exitance);
+            let in_u = error / exitance.u;
+            rows.push(row(
+                "error of exitance",
+                format!("{relative} ({in_u:+.2} u) against the simulator's truth"),
+            ));
+            let rms = percent(truth.radiance_error_rms_relative);
+            rows.push(row("error of radiance", format!("{rms} RMS over the region")));
+        }
+        rows
+    }
+
+    /// One JSON document.
+    pub(crate) fn json(&self) -> Value {
+        let Self { setup, results, .. } = self;
+        let quantity = setup.rig.detector.quantity;
+        let (measured, planned) = self.targets();
+        let mut object = json!({
+            "plan": setup.plan_name,
+            "rig": setup.rig.name,
+            "simulated": setup.rig.is_simulated(),
+            "outcome": self.outcome,
+            "targets_measured": measured,
+            "targets_planned": planned,
+            "rig_s": self.rig_s,
+            "wall_s": self.wall_s,
+            "flags": self.flags().into_iter().map(|(f, n)| (f.to_owned(), json!(n))).collect::<serde_json::Map<_, _>>(),
+            "folder": self.folder.display().to_string(),
+        });
+        match &results.fitted {
+            Ok(fitted) => {
+                let (exitance, flux) = (fitted.fit.exitance(), fitted.fit.flux());
+                object[quantity.exitance_key()] = json!({
+                    "value": exitance.value, "u": exitance.u, "u_independent": exitance.u_independent,
+                    "measured_fraction": fitted.fit.measured_fraction(),
+                });
+                object[quantity.flux_key()] = json!({"value": flux.value, "u": flux.u});
+                if let Some(truth) = &results.truth {
+                    object["truth"] = json!({
+                        quantity.exitance_key(): truth.exitance,
+                        quantity.flux_key(): truth.flux,
+                        "radiance_error_rms_relative": truth.radiance_error_rms_relative,
+                    });
+                }
+            }
+            Err(error) => object["fit_error"] = json!(error.to_string()),
+        }
+        object
+    }
+
+    fn targets(&self) -> (usize, usize) {
+        (self.results.calibrated.samples.len(), targets_planned(self.setup))
+    }
+
+    /// Flags that occur, with how often.
+    fn flags(&self) -> Vec<(&'static str, usize)> {
+        let samples = &self.results.calibrated.samples;
+        Flag::ALL
+            .iter()
+            .map(|flag| (flag.name(), samples.iter().filter(|s| s.flags.contains(*flag)).count()))
+            .filter(|(_, count)| *count > 0)
+            .collect()
+    }
+}
+
+fn row(name: &str, value: String) -> Vec<String> {
+    vec![name.to_owned(), value]
+}
