@@ -252,7 +252,7 @@ pub(crate) struct PortsArgs {
     #[arg(long, value_name = "PORT")]
     pub(crate) probe: Option<String>,
     /// The speed to probe at, bits a second.
-    #[arg(long, default_value_t = 1_000_000, value_name = "BAUD")]
+    #[arg(long, default_value_t = 1_000_000, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     pub(crate) baud: u32,
     /// Print one JSON document.
     #[arg(long)]

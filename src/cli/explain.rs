@@ -7,6 +7,7 @@ use serde_json::json;
 use super::args::ExplainArgs;
 use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs, beside};
+use super::output::{say, say_json};
 use super::setup::{rig_at, stage_at};
 use super::text::table;
 use crate::journal::InputRole;
@@ -52,7 +53,7 @@ pub(crate) fn explain(args: &ExplainArgs) -> Outcome {
                 })
             })
             .collect();
-        println!("{}", json!({"rig": rig.name, "effects": rows, "notes": notes}));
+        say_json(&json!({"rig": rig.name, "effects": rows, "notes": notes}))?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut rows =
@@ -71,9 +72,7 @@ pub(crate) fn explain(args: &ExplainArgs) -> Outcome {
             row.how.clone(),
         ]);
     }
-    print!("{}", table(&rows));
-    for note in notes {
-        println!("  note: {note}");
-    }
+    let notes: String = notes.iter().map(|note| format!("  note: {note}\n")).collect();
+    say(&(table(&rows) + &notes))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use super::args::{ExportArgs, ExportFormat};
 use super::failure::{Failure, Outcome};
+use super::output::write_out;
 use super::results::{Results, read_run};
 use crate::export::{write_atomically, write_samples};
 
@@ -17,12 +18,7 @@ pub(crate) fn export(args: &ExportArgs) -> Outcome {
     match args.output.as_deref().filter(|path| *path != Path::new("-")) {
         Some(path) => write_atomically(path, |out| write_samples(out, quantity, samples))
             .map_err(Failure::midway)?,
-        None => match write_samples(std::io::stdout().lock(), quantity, samples) {
-            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-                return Err(Failure::midway(format!("standard output: {error}")));
-            }
-            _ => {}
-        },
+        None => write_out(|out| write_samples(out, quantity, samples))?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,7 @@
 //! missing; 2: could not start, and left everything as it was.
 
 use std::fmt::Display;
+use std::io::Write as _;
 use std::process::ExitCode;
 
 /// Why a command did not end well.
@@ -33,7 +34,9 @@ impl Failure {
     /// Says so on standard error.
     pub(crate) fn report(&self) -> ExitCode {
         let is_marked = self.text.starts_with("error");
-        eprintln!("{}{}", if is_marked { "" } else { "error: " }, self.text);
+        let mark = if is_marked { "" } else { "error: " };
+        // Where standard error is closed the exit code must say it alone.
+        let _ = writeln!(std::io::stderr(), "{mark}{}", self.text);
         ExitCode::from(self.code)
     }
 }

@@ -1,7 +1,6 @@
 //! `gonio fit`: fits again, from a run's journal or from any CSV of samples, and evaluates the
 //! fit at listed rays.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -9,9 +8,12 @@ use fit::{BasisSpec, Fit, Region};
 
 use super::args::FitArgs;
 use super::failure::{Failure, Outcome};
+use super::output::{say, write_out};
 use super::results::{Results, read_run};
 use super::text::{percent, table, with_uncertainty};
-use crate::export::{FitFile, InputSamples, read_rays, read_samples, write_at, write_atomically};
+use crate::export::{
+    FitFile, InputSamples, RayColumns, read_rays, read_samples, write_at, write_atomically,
+};
 use crate::plan::FitSpec;
 use crate::rig::Quantity;
 
@@ -25,10 +27,17 @@ const CSV_BYTES_MAX: u64 = 2 << 30;
 
 /// Fits again and prints what came out.
 pub(crate) fn fit(args: &FitArgs) -> Outcome {
-    if args.source.is_dir() { fit_run(args) } else { fit_csv(args) }
+    let rays = args.at.as_deref().map(rays_at).transpose()?;
+    if args.source.is_dir() { fit_run(args, rays) } else { fit_csv(args, rays) }
 }
 
-fn fit_run(args: &FitArgs) -> Outcome {
+/// The rays at which the fit shall be evaluated.
+fn rays_at(path: &Path) -> Result<Vec<RayColumns>, Failure> {
+    read_rays(&read_csv(path)?)
+        .map_err(|error| Failure::start(format!("{}: {error}", path.display())))
+}
+
+fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     if args.u_relative.is_some() {
         return Err(Failure::with_help(
             "--u-relative: a run's samples have uncertainties of their own",
@@ -54,10 +63,10 @@ fn fit_run(args: &FitArgs) -> Outcome {
         notes: &[],
         truth: results.truth,
     };
-    show(args, &file)
+    show(args, rays, &file)
 }
 
-fn fit_csv(args: &FitArgs) -> Outcome {
+fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     let shown = args.source.display();
     let bytes = read_csv(&args.source)?;
     let input =
@@ -88,7 +97,7 @@ fn fit_csv(args: &FitArgs) -> Outcome {
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
     }
-    show(args, &file)
+    show(args, rays, &file)
 }
 
 fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
@@ -138,25 +147,16 @@ fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// Prints the fit: at listed rays where those are asked for, as JSON, or as a table.
-fn show(args: &FitArgs, file: &FitFile<'_>) -> Outcome {
-    let out = std::io::stdout().lock();
-    let written = if let Some(path) = &args.at {
-        let rays = read_rays(&read_csv(path)?)
-            .map_err(|error| Failure::start(format!("{}: {error}", path.display())))?;
-        write_at(out, file.quantity, rays.into_iter().map(|r| (r, file.fit.radiance(&r.ray()))))
+fn show(args: &FitArgs, rays: Option<Vec<RayColumns>>, file: &FitFile<'_>) -> Outcome {
+    if let Some(rays) = rays {
+        let estimates = rays.into_iter().map(|ray| (ray, file.fit.radiance(&ray.ray())));
+        write_out(|out| write_at(out, file.quantity, estimates))?;
     } else if args.json {
-        file.write(out)
+        write_out(|out| file.write(out))?;
     } else {
-        let mut out = out;
-        out.write_all(summary(file.fit, file.quantity, file.notes).as_bytes())
-    };
-    match written {
-        // Whoever read it has read enough.
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::midway(format!("standard output: {error}")))
-        }
-        _ => Ok(ExitCode::SUCCESS),
+        say(&summary(file.fit, file.quantity, file.notes))?;
     }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn summary(fit: &Fit, quantity: Quantity, notes: &[String]) -> String {

@@ -8,6 +8,7 @@ mod failure;
 mod fit;
 mod inputs;
 mod nominal;
+mod output;
 mod plan;
 mod ports;
 mod results;

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::args::PlanArgs;
 use super::failure::Outcome;
+use super::output::{say, say_json};
 use super::setup::Setup;
 use super::text::{duration, table};
 use crate::plan::Prediction;
@@ -16,9 +17,9 @@ pub(crate) fn plan(args: &PlanArgs) -> Outcome {
     let setup = Setup::from_disk(&args.plan, &args.rig)?;
     let prediction = &setup.sequence.prediction;
     if args.json {
-        println!("{}", as_json(&setup, prediction));
+        say_json(&as_json(&setup, prediction))?;
     } else {
-        print!("{}", as_text(&setup, prediction));
+        say(&as_text(&setup, prediction))?;
     }
     Ok(ExitCode::SUCCESS)
 }

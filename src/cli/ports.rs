@@ -3,10 +3,12 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
+use firmware_protocol::Identity;
 use serde_json::json;
 
 use super::args::PortsArgs;
 use super::failure::{Failure, Outcome};
+use super::output::{say, say_json};
 use super::session::draw_session;
 use super::text::table;
 use crate::device::{Native, SerialSettings, list_ports, open_serial};
@@ -25,12 +27,12 @@ pub(crate) fn ports(args: &PortsArgs) -> Outcome {
             .iter()
             .map(|port| json!({"path": port.path, "description": port.description}))
             .collect();
-        println!("{}", json!({ "ports": list }));
+        say_json(&json!({ "ports": list }))?;
     } else if ports.is_empty() {
-        println!("no serial port; a pseudo-terminal of `gonio sim --pty` is opened by its path");
+        say("no serial port; a pseudo-terminal of `gonio sim --pty` is opened by its path\n")?;
     } else {
         let rows: Vec<_> = ports.into_iter().map(|p| vec![p.path, p.description]).collect();
-        print!("{}", table(&rows));
+        say(&table(&rows))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -53,6 +55,15 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
             Native::connect(link, draw_session(), baud, PATIENCE).await.map_err(Failure::start)?;
         Ok::<_, Failure>(identity)
     })?;
+    if is_json {
+        say_json(&as_json(port, baud, &identity))?;
+    } else {
+        say(&as_text(&identity))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn as_json(port: &str, baud: u32, identity: &Identity) -> serde_json::Value {
     let axes: Vec<_> = identity
         .axes
         .iter()
@@ -64,24 +75,16 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
             })
         })
         .collect();
-    if is_json {
-        let (major, minor) = identity.protocol;
-        println!(
-            "{}",
-            json!({
-                "port": port, "baud": baud, "protocol": format!("{major}.{minor}"),
-                "boot_id": identity.boot_id, "axes": axes, "gains": identity.gains,
-                "adc_bits": identity.adc_bits, "adc_rate_hz": identity.adc_rate_hz,
-                "queue_depth": identity.queue_depth, "lease_ms": identity.lease_ms,
-            })
-        );
-        return Ok(ExitCode::SUCCESS);
-    }
     let (major, minor) = identity.protocol;
-    println!(
-        "  a controller of gonio's own protocol {major}.{minor}, boot {:08x}",
-        identity.boot_id
-    );
+    json!({
+        "port": port, "baud": baud, "protocol": format!("{major}.{minor}"),
+        "boot_id": identity.boot_id, "axes": axes, "gains": identity.gains,
+        "adc_bits": identity.adc_bits, "adc_rate_hz": identity.adc_rate_hz,
+        "queue_depth": identity.queue_depth, "lease_ms": identity.lease_ms,
+    })
+}
+
+fn as_text(identity: &Identity) -> String {
     let mut rows =
         vec![["channel", "low", "high", "speed", "acceleration"].map(str::to_owned).to_vec()];
     for (channel, axis) in identity.axes.iter().enumerate() {
@@ -93,10 +96,14 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
             format!("{} counts/s²", axis.acceleration),
         ]);
     }
-    print!("{}", table(&rows));
-    println!(
-        "  {} gain ranges, {}-bit converter at {} Hz",
-        identity.gains, identity.adc_bits, identity.adc_rate_hz
-    );
-    Ok(ExitCode::SUCCESS)
+    let (major, minor) = identity.protocol;
+    format!(
+        "  a controller of gonio's own protocol {major}.{minor}, boot {:08x}\n{}  {} gain ranges, \
+         {}-bit converter at {} Hz\n",
+        identity.boot_id,
+        table(&rows),
+        identity.gains,
+        identity.adc_bits,
+        identity.adc_rate_hz
+    )
 }

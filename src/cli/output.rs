@@ -1,0 +1,32 @@
+//! Standard output: what a command answers. A reader that has read enough (`| head`) is no error;
+//! a full disk is one, and is named.
+
+use std::io::{self, BufWriter, ErrorKind, Write};
+
+use super::failure::Failure;
+
+/// Writes a text that has its line ends.
+pub(crate) fn say(text: &str) -> Result<(), Failure> {
+    write_out(|out| out.write_all(text.as_bytes()))
+}
+
+/// Writes one JSON document and ends its line.
+pub(crate) fn say_json(document: &serde_json::Value) -> Result<(), Failure> {
+    write_out(|out| writeln!(out, "{document}"))
+}
+
+/// Hands standard output, buffered, to a writer of something long.
+pub(crate) fn write_out(
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    let written = write(&mut out).and_then(|()| out.flush());
+    // What could not be written is dropped here, not tried once more.
+    drop(out.into_parts());
+    match written {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::midway(format!("standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
