@@ -14,7 +14,7 @@ pub enum ExportError {
         path: PathBuf,
     },
     /// Permissions, or a folder that is not there.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be written: {source}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -24,13 +24,20 @@ pub enum ExportError {
 }
 
 /// Writes a file by way of a temporary one beside it: synced, then renamed. After a crash there is
-/// the file as it was, or as it shall be, and never a part of it. An existing file is replaced.
+/// the file as it was, or as it shall be, and never a part of it. An existing file is replaced; a
+/// link to one stays a link. What is no file (a terminal, a pipe, /dev/null) is written to.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), ExportError> {
-    let partial = partial_of(path);
-    let written = write_and_rename(path, &partial, write);
+    let linked = std::fs::canonicalize(path);
+    let target = linked.as_deref().unwrap_or(path);
+    let partial = partial_of(target);
+    let written = match std::fs::metadata(target) {
+        Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        Ok(found) if !found.is_file() => write_to(target, false, write).map(|_| ()),
+        _ => write_and_rename(target, &partial, write),
+    };
     written.map_err(|source| {
         // It may not be there, and it is of no use.
         let _ = std::fs::remove_file(&partial);
@@ -47,14 +54,22 @@ fn write_and_rename(
     partial: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let file = OpenOptions::new().write(true).create(true).truncate(true).open(partial)?;
-    let mut buffered = BufWriter::new(file);
-    write(&mut buffered)?;
-    buffered.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+    write_to(partial, true, write)?.sync_all()?;
     std::fs::rename(partial, path)?;
     // The new name is durable once its folder is.
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+fn write_to(
+    path: &Path,
+    is_file: bool,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<File> {
+    let file = OpenOptions::new().write(true).create(is_file).truncate(is_file).open(path)?;
+    let mut buffered = BufWriter::new(file);
+    write(&mut buffered)?;
+    buffered.into_inner().map_err(io::IntoInnerError::into_error)
 }
 
 /// A name beside `path` that no other process uses.
@@ -101,10 +116,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_file_is_written_to_and_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("fit-1.json"), folder.path().join("fit.json"));
+        std::fs::write(&target, "before").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_atomically(&link, |out| out.write_all(b"after")).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&target).unwrap(), "after");
+        let device = folder.path().join("null");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+        write_atomically(&device, |out| out.write_all(b"nowhere")).unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+        let error = write_atomically(folder.path(), |_| Ok(())).unwrap_err();
+        assert!(error.to_string().contains("directory"), "{error}");
+    }
+
+    #[test]
     fn a_missing_folder_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("nowhere/samples.csv");
         let error = write_atomically(&path, |_| Ok(())).unwrap_err();
-        assert!(error.to_string().contains("nowhere/samples.csv: No such file"), "{error}");
+        assert!(
+            error.to_string().contains("nowhere/samples.csv: cannot be written: No such file"),
+            "{error}"
+        );
     }
 }
