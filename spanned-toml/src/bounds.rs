@@ -47,9 +47,25 @@ impl fmt::Display for Bounds {
         let below = if self.high_included { "at most" } else { "below" };
         match (self.low.is_finite(), self.high.is_finite()) {
             (false, false) => f.write_str("a finite number"),
-            (true, false) => write!(f, "a finite number {above} {}", self.low),
-            (false, true) => write!(f, "a finite number {below} {}", self.high),
-            (true, true) => write!(f, "a number {above} {} and {below} {}", self.low, self.high),
+            (true, false) => write!(f, "a finite number {above} {}", Short(self.low)),
+            (false, true) => write!(f, "a finite number {below} {}", Short(self.high)),
+            (true, true) => {
+                write!(f, "a number {above} {} and {below} {}", Short(self.low), Short(self.high))
+            }
+        }
+    }
+}
+
+/// A number as a person would write it: powers of ten where there would be many zeros.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size == 0.0 || (1e-4..1e9).contains(&size) {
+            write!(f, "{}", self.0)
+        } else {
+            write!(f, "{:e}", self.0)
         }
     }
 }
@@ -72,5 +88,7 @@ mod tests {
         assert!(Bounds::NON_NEGATIVE.contain(0.0) && !Bounds::POSITIVE.contain(0.0));
         assert!(Bounds::between(0.0, 90.0).contain(90.0));
         assert_eq!(Bounds::POSITIVE.to_string(), "a finite number above 0");
+        let wide = Bounds::between(-1e15, 1e6).to_string();
+        assert_eq!(wide, "a number at least -1e15 and at most 1000000");
     }
 }

@@ -45,9 +45,13 @@ impl Problem {
 
     /// A problem with a file as a whole.
     pub fn of_file(source: &Source, what: &str, expected: &str, help: &str) -> Self {
-        let mut problem = Self::at(source, 0..0, "", what, expected, help);
-        problem.0.span = None;
-        problem
+        Self::at(source, 0..0, "", what, expected, help).without_place()
+    }
+
+    /// The same problem, with the file as a whole.
+    pub(crate) fn without_place(mut self) -> Self {
+        self.0.span = None;
+        self
     }
 
     /// The file's name.

@@ -57,6 +57,14 @@ impl Source {
                 "is this the right file?",
             )
         })?;
+        if let Some(byte) = text.find('\0') {
+            let help = "is this the right file?";
+            return Err(problem(format!("is not text: byte {byte} is 0"), "a TOML file", help));
+        }
+        if text.trim().is_empty() {
+            let help = "is this the right file, and was it saved?";
+            return Err(problem("is empty".into(), "a TOML file", help));
+        }
         Ok(Self::new(&name, &text))
     }
 
@@ -118,7 +126,7 @@ impl Document {
     }
 }
 
-/// A missing key of the root is reported at the file's first line, not over all of it.
+/// What the reader finds wrong with the root as a whole is shown at the file's first line.
 fn whole(source: &Source) -> Range<usize> {
     0..source.text().find('\n').unwrap_or(source.text().len())
 }

@@ -3,11 +3,17 @@
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
-use crate::value::{Entries, Kind, Value};
+use crate::value::{Entries, Entry, Kind, Value};
 use crate::{Bounds, Problem, Source};
 
 /// Two words this many edits apart, or fewer, are offered as each other's correction.
 const NEAREST_EDITS_MAX: usize = 4;
+/// A word is taken for a misspelt one if this many letters of it stand for each edit.
+const WORD_LETTERS_PER_EDIT: usize = 3;
+/// Words that keys end with to say a number's unit: one for another is a slip of its own.
+const UNITS: [&str; 14] =
+    ["a", "cm", "deg", "h", "hz", "khz", "m", "min", "mm", "ms", "rad", "s", "um", "us"];
+const TABLE: &str = "a table";
 
 /// A table being read. Ask for each key that may stand in it, then call [`Table::finish`].
 #[derive(Debug)]
@@ -85,7 +91,15 @@ impl<'d> Table<'d> {
             .iter()
             .find(|(word, _)| matches!(&value.kind, Kind::Text(found) if found == word))
             .map(|(_, meaning)| Some(meaning.clone()))
-            .ok_or_else(|| self.unexpected(key, value, &one_of(choices)))
+            .ok_or_else(|| {
+                let words: Vec<String> = choices.iter().map(|(word, _)| (*word).into()).collect();
+                let near = match &value.kind {
+                    Kind::Text(found) => nearest(found, &words),
+                    _ => None,
+                };
+                let help = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
+                self.unexpected_with(key, value, &one_of(choices), &help)
+            })
     }
 
     /// As [`Table::choice`], but it must be there.
@@ -143,7 +157,7 @@ impl<'d> Table<'d> {
 
     /// As [`Table::table`], but it must be there.
     pub fn required_table(&self, key: &str) -> Result<Table<'d>, Problem> {
-        self.table(key)?.ok_or_else(|| self.missing(key, "a table"))
+        self.table(key)?.ok_or_else(|| self.missing(key, TABLE))
     }
 
     /// A list of tables (`[[key]]`), empty if the key is absent.
@@ -220,28 +234,63 @@ impl<'d> Table<'d> {
 
     fn read_table(&self, key: &str, name: &str, value: &'d Value) -> Result<Table<'d>, Problem> {
         let Kind::Table(entries) = &value.kind else {
-            return Err(self.unexpected(key, value, "a table"));
+            return Err(self.unexpected(key, value, TABLE));
         };
         Ok(Table::new(self.source, self.dotted(name), value.span.clone(), entries))
     }
 
     fn missing(&self, key: &str, expected: &str) -> Problem {
-        Problem::at(
-            self.source,
-            self.span.clone(),
-            &self.dotted(key),
-            "missing key",
-            expected,
-            &format!("add `{key} = ...` here"),
-        )
+        if let Some(entry) = self.misspelt(key) {
+            let expected = format!("`{key}`, {expected}");
+            let (found, span) = (self.dotted(&entry.key), entry.key_span.clone());
+            let help = format!("did you mean `{key}`?");
+            return Problem::at(self.source, span, &found, "unknown key", &expected, &help);
+        }
+        let key_or_table = if expected == TABLE {
+            format!("a table `[{}]`", self.dotted(key))
+        } else {
+            format!("`{key} = ...`")
+        };
+        let key = self.dotted(key);
+        if self.path.is_empty() {
+            let help = format!("add {key_or_table}, or is this the wrong file?");
+            let whole = self.span.clone();
+            return Problem::at(self.source, whole, &key, "missing key", expected, &help)
+                .without_place();
+        }
+        let help = format!("add {key_or_table} here");
+        Problem::at(self.source, self.span.clone(), &key, "missing key", expected, &help)
+    }
+
+    /// The key, not asked for so far, that is likely to be `key` misspelt. It may yet be asked
+    /// for, so the two must differ in one word alone (`_` parts words), and that little; or in
+    /// the unit, the last word. So `y_mm` is not taken for `x_mm`.
+    fn misspelt(&self, key: &str) -> Option<&'d Entry> {
+        let asked = self.asked.borrow();
+        let words: Vec<&str> = key.split('_').collect();
+        self.entries.iter().filter(|entry| !asked.contains(&entry.key)).find(|entry| {
+            let found: Vec<&str> = entry.key.split('_').collect();
+            if found.len() != words.len() {
+                return false;
+            }
+            let mut differing = (0..words.len()).filter(|i| words[*i] != found[*i]);
+            let (Some(i), None) = (differing.next(), differing.next()) else { return false };
+            let is_unit = UNITS.contains(&words[i]) && UNITS.contains(&found[i]);
+            let letters = words[i].len().max(found[i].len());
+            is_unit || edits(words[i], found[i]) <= letters / WORD_LETTERS_PER_EDIT
+        })
     }
 
     fn unexpected(&self, key: &str, value: &Value, expected: &str) -> Problem {
+        self.unexpected_with(key, value, expected, "")
+    }
+
+    fn unexpected_with(&self, key: &str, value: &Value, expected: &str, help: &str) -> Problem {
         let span = value.span.clone();
         let found = self.source.text().get(span.clone()).unwrap_or_default();
         let found: String = found.lines().next().unwrap_or_default().chars().take(60).collect();
         let what = format!("found {} {found}", value.kind.name());
-        Problem::at(self.source, span, &self.dotted(key), &what, expected, "")
+        Problem::at(self.source, span, &self.dotted(key), &what, expected, help)
     }
 
     fn dotted(&self, key: &str) -> String {
@@ -319,6 +368,45 @@ mod tests {
         let problem = link.required_integer("baud", 1..=10).unwrap_err();
         assert_eq!(problem.line_and_column().unwrap().0, 2);
         assert_eq!(problem.what(), "missing key");
+    }
+
+    #[test]
+    fn a_missing_key_that_is_there_misspelt_is_shown_where_it_stands() {
+        for (text, key) in [
+            ("[region]\ntheta_mx_deg = 80", "theta_max_deg"),
+            ("[region]\ntheta_max_rad = 80", "theta_max_deg"),
+            ("[region]\ndwel_ms = 80", "dwell_ms"),
+        ] {
+            let document = document(text);
+            let region = document.root().required_table("region").unwrap();
+            let problem = region.required_number(key, Bounds::POSITIVE).unwrap_err();
+            assert_eq!((problem.what(), problem.line_and_column()), ("unknown key", Some((2, 1))));
+            assert!(problem.to_string().contains(&format!("did you mean `{key}`?")), "{problem}");
+        }
+        for other in ["y_mm = 1", "x_count = 1", "phi_step_deg = 3"] {
+            let document = document(&format!("[region]\n{other}"));
+            let region = document.root().required_table("region").unwrap();
+            for key in ["x_mm", "theta_step_deg"] {
+                let problem = region.required_number(key, Bounds::POSITIVE).unwrap_err();
+                assert_eq!(problem.what(), "missing key", "{problem}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_file_itself_lacks_has_no_line() {
+        let document = document("# A plan.\na = 1\n");
+        let problem = document.root().required_table("region").unwrap_err();
+        let text = problem.to_string();
+        assert!(text.contains("rig.toml: region: missing key"), "{text}");
+        assert!(text.contains("add a table `[region]`, or is this the wrong file?"), "{text}");
+    }
+
+    #[test]
+    fn a_misspelt_word_is_corrected() {
+        let document = document("kind = \"rastr\"");
+        let problem = document.root().required_choice("kind", &[("raster", 1), ("list", 2)]);
+        assert!(problem.unwrap_err().to_string().contains("did you mean \"raster\"?"));
     }
 
     #[test]

@@ -39,7 +39,7 @@ fn every_mistake_is_named_at_its_line() {
     for (from, to, key) in [
         ("travel_deg = [-95, 95]", "travel_deg = [95, -95]", "axes.theta.travel_deg"),
         ("travel_deg = [-95, 95]", "travel_deg = [5, 95]", "axes.theta.travel_deg"),
-        ("travel_deg = [-95, 95]", "travel_mm = [-95, 95]", "axes.theta.travel_deg"),
+        ("travel_deg = [-95, 95]", "travel_mm = [-95, 95]", "axes.theta.travel_mm"),
         ("speed_deg_per_s = 60", "speed_deg_per_s = 0", "axes.theta.speed_deg_per_s"),
         (
             "acceleration_deg_per_s2 = 120",
