@@ -79,6 +79,14 @@ impl Inputs {
         }
     }
 
+    /// Whether `path` can't be looked up: why not. What was read before is not looked up again.
+    pub(crate) fn absence(&self, path: &Path) -> Option<std::io::Error> {
+        match &self.origin {
+            Origin::Disk => std::fs::metadata(path).err(),
+            Origin::Memory(_) => None,
+        }
+    }
+
     /// Reads what `named_in` calls `name`: a photometric file, a list of poses.
     pub(crate) fn attachment(&mut self, named_in: &Path, name: &str) -> Result<Vec<u8>, String> {
         let bytes = match &self.origin {

@@ -85,16 +85,8 @@ impl Setup {
         let plan = Plan::read(inputs.document(InputRole::Plan, plan_path)?)?;
         let plan_name = plan.name.clone().or(plan_name).unwrap_or_else(|| folder_name(plan_path));
         let rig = read_rig(&mut inputs, plan_path, &plan, choice)?;
-        let list = match plan.list_file() {
-            None => None,
-            Some(name) => {
-                let bytes = inputs.attachment(plan_path, name).map_err(Failure::start)?;
-                let text = String::from_utf8(bytes).map_err(|_| {
-                    Failure::start(format!("{name}: is not text; expected a CSV of poses in UTF-8"))
-                })?;
-                Some(Source::new(name, &text))
-            }
-        };
+        let list = plan.list_file().map(|name| read_list(&mut inputs, plan_path, &plan, name));
+        let list = list.transpose()?;
         let sequence = plan.lay_out(&rig, list.as_ref())?;
         let plan_hash = plan.hash(&sequence);
         let stage = read_stage(&mut inputs, plan_path, &plan, choice, &rig, seed)?;
@@ -122,6 +114,43 @@ impl Stage {
     }
 }
 
+/// Reads the plan's list of poses.
+fn read_list(
+    inputs: &mut Inputs,
+    plan_path: &Path,
+    plan: &Plan,
+    name: &str,
+) -> Result<Source, Failure> {
+    let expected = "a CSV of poses, relative to the plan's folder";
+    let refused = |what: &str, help: &str| match plan.document().root().table("schedule") {
+        Ok(Some(schedule)) => schedule.problem("file", what, expected, help).into(),
+        _ => Failure::start(what),
+    };
+    let bytes = inputs
+        .attachment(plan_path, name)
+        .map_err(|error| refused(&error, "correct the path, or put the list there"))?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        refused(&format!("{name}: is not text in UTF-8"), "save the list as plain CSV")
+    })?;
+    Ok(Source::new(name, &text))
+}
+
+/// The path of a file that the plan names; where it is missing, the plan's line is at fault.
+fn named_in_plan(
+    inputs: &Inputs,
+    plan_path: &Path,
+    plan: &Plan,
+    key: &str,
+    name: &str,
+) -> Result<PathBuf, Failure> {
+    let path = beside(plan_path, name);
+    let Some(error) = inputs.absence(&path) else { return Ok(path) };
+    let help = format!("correct the path, or choose another file with --{key}");
+    let what = format!("{}: cannot be read: {error}", path.display());
+    let expected = "a file, relative to the plan's folder";
+    Err(plan.document().root().problem(key, &what, expected, &help).into())
+}
+
 /// Reads the rig that the choice or the plan names; with neither it is an error, so that no
 /// fabricated data come by forgetting a flag.
 fn read_rig(
@@ -133,16 +162,17 @@ fn read_rig(
     if inputs.remembers(InputRole::Rig) {
         return Ok(Rig::read(inputs.document(InputRole::Rig, Path::new("rig.toml"))?)?);
     }
-    let from_plan = || {
-        let name = plan.rig.as_deref()?;
-        Some(if name == BUILT_IN { PathBuf::from(name) } else { beside(plan_path, name) })
+    let path = match (&choice.rig, plan.rig.as_deref()) {
+        (Some(path), _) => path.clone(),
+        (None, Some(BUILT_IN)) => PathBuf::from(BUILT_IN),
+        (None, Some(name)) => named_in_plan(inputs, plan_path, plan, "rig", name)?,
+        (None, None) => {
+            return Err(Failure::with_help(
+                format!("{}: the plan names no rig, and neither does --rig", plan_path.display()),
+                "add `rig = \"rig.toml\"` (or \"simulated\") to the plan, or give --rig",
+            ));
+        }
     };
-    let path = choice.rig.clone().or_else(from_plan).ok_or_else(|| {
-        Failure::with_help(
-            format!("{}: the plan names no rig, and neither does --rig", plan_path.display()),
-            "add `rig = \"rig.toml\"` (or \"simulated\") to the plan, or give --rig",
-        )
-    })?;
     rig_at(inputs, &path)
 }
 
@@ -173,14 +203,17 @@ fn read_stage(
             )),
         };
     }
-    let from_plan = || plan.scene.as_deref().map(|name| beside(plan_path, name));
-    let remembered = || inputs.remembers(InputRole::Scene).then(|| PathBuf::from("scene.toml"));
-    let path = choice.scene.clone().or_else(from_plan).or_else(remembered).ok_or_else(|| {
-        Failure::with_help(
-            format!("{}: a simulated rig needs a scene to look at", plan_path.display()),
-            "add `scene = \"scene.toml\"` to the plan, or give --scene",
-        )
-    })?;
+    let path = match (&choice.scene, plan.scene.as_deref()) {
+        (Some(path), _) => path.clone(),
+        (None, Some(name)) => named_in_plan(inputs, plan_path, plan, "scene", name)?,
+        (None, None) if inputs.remembers(InputRole::Scene) => PathBuf::from("scene.toml"),
+        (None, None) => {
+            return Err(Failure::with_help(
+                format!("{}: a simulated rig needs a scene to look at", plan_path.display()),
+                "add `scene = \"scene.toml\"` to the plan, or give --scene",
+            ));
+        }
+    };
     Ok(Some(stage_at(inputs, &path, rig, seed)?))
 }
 

@@ -137,19 +137,29 @@ impl Plan {
     fn candidates(&self, rig: &Rig, poses: &Poses<'_>) -> Result<Vec<Vec<AxisPositions>>, Problem> {
         let candidates = poses.poses.iter().enumerate().map(|(index, pose)| {
             if poses.places.is_some() {
-                check_inside(&self.region, pose)
-                    .map_err(|what| self.refused(poses, index, &what, "a pose in the region"))?;
+                check_inside(&self.region, pose).map_err(|what| {
+                    let help = "widen the region, or move or leave out the pose";
+                    self.refused(poses, index, &what, "a pose in the region", help)
+                })?;
             }
             rig.reachable(*pose).map_err(|e: LimitError| {
-                self.refused(poses, index, &e.to_string(), "a pose inside the rig's limits")
+                let help =
+                    "shrink the region, move or leave out the pose, or check the rig's travel";
+                self.refused(poses, index, &e.to_string(), "a pose inside the rig's limits", help)
             })
         });
         candidates.collect()
     }
 
-    fn refused(&self, poses: &Poses<'_>, index: usize, why: &str, expected: &str) -> Problem {
+    fn refused(
+        &self,
+        poses: &Poses<'_>,
+        index: usize,
+        why: &str,
+        expected: &str,
+        help: &str,
+    ) -> Problem {
         let what = format!("pose {index}: {why}");
-        let help = "shrink the region, move or leave out the pose, or check the rig's travel";
         match &poses.places {
             Some((source, places)) => {
                 Problem::at(source, places[index].clone(), "", &what, expected, help)

@@ -100,9 +100,13 @@ fn pose(
     let mut values = [0.0; 4];
     for (i, value) in values.iter_mut().enumerate() {
         let text = record.get(columns[i]).unwrap_or_default();
-        *value = text.parse().ok().filter(|value| BOUNDS[i].contain(*value)).ok_or_else(|| {
+        let parsed: Option<f64> = text.parse().ok();
+        *value = parsed.filter(|value| BOUNDS[i].contain(*value)).ok_or_else(|| {
             let what = format!("found \"{text}\"");
-            let help = "write a plain number, with a point for the decimals";
+            let help = match parsed {
+                Some(number) if number.is_finite() => "correct the pose, or leave it out",
+                _ => "write a plain number, with a point for the decimals",
+            };
             Problem::at(source, span.clone(), COLUMNS[i], &what, &BOUNDS[i].to_string(), help)
         })?;
     }

@@ -22,10 +22,14 @@ pub(super) fn read(
         table.problem("file", &format!("{file}: {what}"), expected, help)
     };
     let bytes = load(file).map_err(|e| {
-        at_file(&e, "a photometric file", "its path is relative to the scene's file")
+        // The error names the file as it was looked for.
+        let help = "its path is relative to the scene's file";
+        table.problem("file", &e, "a photometric file", help)
     })?;
-    let photometry = lm63::read(&bytes)
-        .map_err(|e| at_file(&e.to_string(), "a photometric file in IES LM-63", ""))?;
+    let photometry = lm63::read(&bytes).map_err(|e| {
+        let help = "is the file complete, and the right one? Get it again from where it came";
+        at_file(&e.to_string(), "a photometric file in IES LM-63", help)
+    })?;
     let scale = si_unit(photometry.intensity_unit(), quantity).map_err(|expected| {
         let what = format!(
             "intensities in {}, and the rig's detector is calibrated for {}",
