@@ -22,6 +22,10 @@ const ANGULAR_DEGREE: usize = 6;
 const POSITION_DEGREE: usize = 0;
 /// A region's cone ends this far beyond the outermost sample of a CSV at most.
 const THETA_MAX_RAD: f64 = core::f64::consts::FRAC_PI_2;
+const FIT_HELP: &str =
+    "lower --angular-degree or --position-degree, or measure what is not determined";
+const CSV_HELP: &str = "expected a header with x_mm, y_mm, theta_deg, phi_deg and for example \
+                        radiance_w_per_m2_sr, commas between, a point for the decimals";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
 
@@ -33,8 +37,9 @@ pub(crate) fn fit(args: &FitArgs) -> Outcome {
 
 /// The rays at which the fit shall be evaluated.
 fn rays_at(path: &Path) -> Result<Vec<RayColumns>, Failure> {
+    let help = "expected a header with x_mm, y_mm, theta_deg and phi_deg, and a row for each ray";
     read_rays(&read_csv(path)?)
-        .map_err(|error| Failure::start(format!("{}: {error}", path.display())))
+        .map_err(|error| Failure::with_help(format!("{}: {error}", path.display()), help))
 }
 
 fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
@@ -50,8 +55,10 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
     };
     let results = Results::of(&setup, spec, &readings)?;
-    let fitted =
-        results.fitted.as_ref().map_err(|error| Failure::midway(format!("fit: {error}")))?;
+    let fitted = results
+        .fitted
+        .as_ref()
+        .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
     let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
     results.write_fit(&path, &setup, fitted).map_err(Failure::midway)?;
     let file = FitFile {
@@ -69,8 +76,8 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
 fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     let shown = args.source.display();
     let bytes = read_csv(&args.source)?;
-    let input =
-        read_samples(&bytes).map_err(|error| Failure::start(format!("{shown}: {error}")))?;
+    let input = read_samples(&bytes)
+        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), CSV_HELP))?;
     if let Some(u) = args.u_relative
         && !(u > 0.0 && u.is_finite())
     {
@@ -83,7 +90,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     };
     let samples = input.fit_samples(args.u_relative);
     let fit = fit::fit(&samples, &region, basis, &[])
-        .map_err(|error| Failure::start(format!("{shown}: {error}")))?;
+        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), FIT_HELP))?;
     let notes = [note_on_u(&input, args.u_relative)];
     let file = FitFile {
         fit: &fit,
@@ -134,7 +141,7 @@ fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
     let cannot = |error: std::io::Error| {
         Failure::with_help(
             format!("{shown}: cannot be read: {error}"),
-            "expected a run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance",
+            "give a run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance",
         )
     };
     let size = std::fs::metadata(path).map_err(cannot)?.len();

@@ -14,7 +14,7 @@ pub enum JournalError {
         path: PathBuf,
     },
     /// There is no such file: the folder is not a run's, or its journal was moved.
-    #[error("{}: no such file; expected a run's journal", path.display())]
+    #[error("{}: no such file; expected a run's folder with its journal", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
