@@ -1,4 +1,6 @@
 //! Driver, engine and owner of a rig, end to end over the real protocol in virtual time.
 
+mod bench;
 mod board;
 mod driver;
+mod engine;

@@ -1,0 +1,430 @@
+//! The engine: pumps driver, machine and journal for one run, and hears what people ask.
+//!
+//! It decides nothing: the machine does. Waiting has an order: what people ask, time-outs, the
+//! device, the journal.
+
+use std::collections::BTreeMap;
+
+use firmware_protocol::{CommandId, Identity, Instant, Reply, RequestType, Status};
+use tokio::sync::{mpsc, watch};
+
+use super::clock::RunClock;
+use super::desk::{Desk, Order};
+use super::events::{Happening, Progress};
+use super::hardware::{Hardware, ReachError};
+use super::job::{Check, Ended, Job};
+use super::machine::{Action, Connected, Input, Machine, Program, Setup, Taken, Wish};
+use super::pace::Pace;
+use super::reading::{Taking, reading};
+use super::state::{Fault, Outcome, Position, State};
+use crate::device::{DeviceEvent, LinkLost};
+use crate::journal::{self, EventKind, JournalError, Record, Writer};
+use crate::plan::RESUME_IDS_FROM;
+use crate::rig::Reading;
+
+enum Woken {
+    Order(Option<Order>),
+    TimedOut,
+    Device(DeviceEvent),
+    Journal,
+}
+
+pub(super) struct Engine<'a> {
+    hardware: &'a mut Hardware,
+    orders: &'a mut mpsc::Receiver<Order>,
+    desk: &'a mut Desk,
+    machine: Machine,
+    check: Option<Check>,
+    checked: Vec<Reading>,
+    journal: Writer,
+    committed: watch::Receiver<journal::Progress>,
+    lost: Option<JournalError>,
+    unreached: Option<ReachError>,
+    clock: RunClock,
+    pace: Pace,
+    progress: Progress,
+    // Frames sent again, for commands that needed it.
+    retries: BTreeMap<CommandId, u32>,
+    origin: tokio::time::Instant,
+    boot_id: Option<u32>,
+    outcome: Option<Outcome>,
+    wants_link: bool,
+    session: u32,
+    session_began_s: f64,
+    rig_s_max: f64,
+}
+
+impl<'a> Engine<'a> {
+    pub(super) fn new(
+        hardware: &'a mut Hardware,
+        orders: &'a mut mpsc::Receiver<Order>,
+        desk: &'a mut Desk,
+        job: Job,
+        journal: Writer,
+    ) -> Self {
+        let Job { steps, done_before, warm_up, mut check, session, session_began_s, .. } = job;
+        let pace = Pace::new(&hardware.rig, &steps);
+        let progress = Progress {
+            done: done_before,
+            total: done_before + steps.len(),
+            rig_s: session_began_s,
+            rest_s: pace.rest_s(),
+        };
+        let setup =
+            Setup { rig: hardware.rig.clone(), home_first: job.home_first, on_fault: job.on_fault };
+        let checks = check.as_mut().map(|check| std::mem::take(&mut check.steps));
+        let program = Program { warm_up, checks: checks.unwrap_or_default(), steps };
+        Self {
+            hardware,
+            orders,
+            desk,
+            machine: Machine::new(setup, program),
+            check,
+            checked: Vec::new(),
+            committed: journal.progress(),
+            journal,
+            lost: None,
+            unreached: None,
+            clock: RunClock::default(),
+            pace,
+            progress,
+            retries: BTreeMap::new(),
+            origin: tokio::time::Instant::now(),
+            boot_id: None,
+            outcome: None,
+            wants_link: true,
+            session,
+            session_began_s,
+            rig_s_max: job.rig_time_max.map_or(f64::INFINITY, |max| max.as_secs_f64()),
+        }
+    }
+
+    /// Runs to the end, whatever that is.
+    pub(super) async fn run(mut self) -> Ended {
+        self.desk.begin(self.progress);
+        loop {
+            if std::mem::take(&mut self.wants_link) {
+                self.connect().await;
+            }
+            self.act().await;
+            if let Some(outcome) = self.outcome.take() {
+                return self.end(outcome).await;
+            }
+            if !self.wants_link {
+                let woken = self.wait().await;
+                self.wake(woken);
+            }
+        }
+    }
+
+    fn now(&self) -> Instant {
+        Instant::ZERO + self.origin.elapsed()
+    }
+
+    async fn wait(&mut self) -> Woken {
+        let until = self.machine.poll_timeout();
+        let until = until.map(|at| self.origin + at.since(Instant::ZERO));
+        let native = self.hardware.native.as_mut();
+        tokio::select! {
+            biased;
+            order = self.orders.recv(), if !self.desk.is_closing => Woken::Order(order),
+            () = tokio::time::sleep_until(until.unwrap_or(self.origin)), if until.is_some() => {
+                Woken::TimedOut
+            }
+            event = async {
+                match native {
+                    Some(native) => native.next_event().await,
+                    None => std::future::pending().await,
+                }
+            } => Woken::Device(event),
+            Ok(()) = self.committed.changed() => Woken::Journal,
+        }
+    }
+
+    fn wake(&mut self, woken: Woken) {
+        let now = self.now();
+        match woken {
+            Woken::Order(order) => self.obey(order),
+            Woken::TimedOut => self.machine.handle_timeout(now),
+            Woken::Device(event) => self.hear(event),
+            Woken::Journal => {
+                let failure = self.committed.borrow_and_update().failure.clone();
+                if let Some(failure) = failure {
+                    self.journal_failed(failure);
+                }
+            }
+        }
+    }
+
+    /// Somebody asks something; nobody left to ask means that nobody wants the run.
+    fn obey(&mut self, order: Option<Order>) {
+        let now = self.now();
+        match order {
+            Some(Order::Wish(wish, reply)) => {
+                let answer = self.machine.handle_request(now, wish);
+                let _ = reply.send(Some(answer));
+            }
+            Some(Order::ShutDown) | None => {
+                self.desk.is_closing = true;
+                self.machine.handle_request(now, Wish::Abort);
+            }
+            Some(other) => other.refuse(),
+        }
+    }
+
+    /// Opens a session, while people may still ask for the end of it all.
+    async fn connect(&mut self) {
+        let reached = {
+            let reach = self.hardware.reach();
+            tokio::pin!(reach);
+            loop {
+                let now = Instant::ZERO + self.origin.elapsed();
+                tokio::select! {
+                    biased;
+                    order = self.orders.recv(), if !self.desk.is_closing => match order {
+                        Some(Order::Wish(wish, reply)) => {
+                            let answer = self.machine.handle_request(now, wish);
+                            let _ = reply.send(Some(answer));
+                        }
+                        Some(Order::ShutDown) | None => {
+                            self.desk.is_closing = true;
+                            self.machine.handle_request(now, Wish::Abort);
+                        }
+                        Some(other) => other.refuse(),
+                    },
+                    reached = &mut reach => break reached,
+                }
+                if self.machine.state() == State::Done {
+                    return;
+                }
+            }
+        };
+        match reached {
+            Ok((identity, status)) => self.connected(&identity, &status),
+            Err(error) => self.unreached(&error),
+        }
+    }
+
+    fn connected(&mut self, identity: &Identity, status: &Status) {
+        let now = self.now();
+        self.unreached = None;
+        match self.boot_id.replace(identity.boot_id) {
+            Some(boot_id) if boot_id == identity.boot_id => {
+                self.clock.micros(status.tick, now);
+            }
+            Some(_) => self.clock.restart(status.tick, now),
+            None => {
+                self.clock.restart(status.tick, now);
+                self.record(Record::SessionBegan {
+                    number: self.session,
+                    boot_id: identity.boot_id,
+                    started_s: self.session_began_s,
+                });
+            }
+        }
+        let connected = Connected {
+            boot_id: identity.boot_id,
+            queue_depth: identity.queue_depth,
+            homed: status.homed,
+            last_id: status.last_id,
+            fault: status.fault,
+        };
+        self.machine.handle(now, Input::Connected(connected));
+    }
+
+    fn unreached(&mut self, error: &ReachError) {
+        if self.boot_id.is_none() {
+            self.unreached = Some(error.clone());
+        }
+        let now = self.now();
+        self.machine.handle(now, Input::Fault(Fault::LinkLost(error.to_string())));
+    }
+
+    fn hear(&mut self, event: DeviceEvent) {
+        let input = match event {
+            DeviceEvent::Event(event) => Input::Event(event),
+            DeviceEvent::LinkLost(lost) => {
+                if matches!(lost, LinkLost::HungUp { .. }) {
+                    self.hardware.native = None;
+                }
+                Input::Fault(Fault::LinkLost(lost.to_string()))
+            }
+            DeviceEvent::Restarted { .. } => Input::Fault(Fault::Restarted),
+            DeviceEvent::Reply { request, reply, retries } => match reply {
+                Reply::Accepted(id) => {
+                    if retries > 0 {
+                        self.retries.insert(id, retries.into());
+                    }
+                    Input::Accepted(id)
+                }
+                Reply::Rejected(_, why) if request == RequestType::ClearFault => {
+                    Input::ClearRefused(why)
+                }
+                Reply::Rejected(id, why) => Input::Rejected(id, why),
+                Reply::Stopping => Input::Stopping,
+                Reply::Cleared => Input::Cleared,
+                Reply::Acknowledged(_) | Reply::Alive | Reply::Identity(_) | Reply::Status(_) => {
+                    return;
+                }
+            },
+        };
+        let now = self.now();
+        self.machine.handle(now, input);
+    }
+
+    /// Carries out what the machine decided, in order.
+    async fn act(&mut self) {
+        while let Some(action) = self.machine.poll_action() {
+            match action {
+                Action::Send(request) => {
+                    if let Some(native) = &self.hardware.native {
+                        native.submit(request);
+                    }
+                }
+                Action::Record(taken) => self.take(*taken),
+                Action::Became(state) => self.became(state).await,
+                Action::Position(position) => self.position(position),
+                Action::Fault(fault) => {
+                    self.note(EventKind::Fault, &fault.to_string());
+                    self.desk.tell(Happening::Fault(fault));
+                }
+                Action::AskSource(source) => self.desk.tell(Happening::AskSource(source)),
+                Action::Judge => self.judge(),
+                Action::Reconnect => self.wants_link = true,
+                Action::Finish(outcome) => self.outcome = Some(outcome),
+            }
+        }
+    }
+
+    async fn became(&mut self, state: State) {
+        match state {
+            State::Paused => self.note(EventKind::Pause, "at rest"),
+            State::Faulted | State::Stopping | State::Homing => {}
+            _ if matches!(self.desk.state(), State::Paused | State::Faulted) => {
+                self.note(EventKind::Continue, state.name());
+            }
+            _ => {}
+        }
+        if !matches!(state, State::Moving | State::Settling | State::Dwelling) {
+            self.pace.interrupt();
+            self.tell_link();
+        }
+        self.desk.tell(Happening::State(state));
+        // Whoever stands still can wait for the disk.
+        if matches!(state, State::Paused | State::Faulted)
+            && let Err(error) = self.journal.flush().await
+        {
+            self.journal_failed(error);
+        }
+    }
+
+    fn position(&mut self, position: Position) {
+        if position.is_trusted() {
+            self.note(EventKind::Homed, &position.to_string());
+        } else {
+            self.note(EventKind::PositionTrust, &position.to_string());
+        }
+        self.desk.tell(Happening::Position(position));
+    }
+
+    /// Takes a reading over: the acknowledgement is the machine's next action.
+    fn take(&mut self, taken: Taken) {
+        let Taken { step, id, result } = taken;
+        let now = self.now();
+        let start_us = self.clock.micros(result.start_tick, now);
+        let end_us = self.clock.micros(result.end_tick, now);
+        let taking = Taking {
+            session: self.session,
+            session_began_s: self.session_began_s,
+            start_us,
+            end_us,
+            link_retries: self.retries.remove(&id).unwrap_or_default(),
+        };
+        self.retries.retain(|command, _| *command > id);
+        let reading = reading(&self.hardware.rig, &step, &result, taking);
+        self.record(Record::Reading(reading.clone()));
+        self.progress.rig_s = self.session_began_s + end_us as f64 * 1e-6;
+        if step.id >= RESUME_IDS_FROM {
+            self.checked.push(reading.clone());
+        }
+        if step.id < crate::plan::WARM_UP_IDS_FROM {
+            self.progress.done += 1;
+            self.pace.step(&self.hardware.rig, &step, &reading, self.progress.rig_s);
+            self.progress.rest_s = self.pace.rest_s();
+        } else {
+            self.pace.interrupt();
+        }
+        self.desk.tell(Happening::Reading(Box::new(reading)));
+        self.desk.tell(Happening::Progress(self.progress));
+        if self.progress.rig_s >= self.rig_s_max {
+            self.rig_s_max = f64::INFINITY;
+            self.note(EventKind::Note, "the plan's rig time is used up");
+            self.machine.handle_request(now, Wish::Stop);
+        }
+    }
+
+    fn judge(&mut self) {
+        let judgement = self.check.as_mut().map(|check| (check.judge)(&self.checked));
+        let go_on = match judgement {
+            None => Ok(()),
+            Some(judgement) => {
+                if let Some(check) = judgement.check {
+                    self.record(Record::ReferenceCheck(check.clone()));
+                    self.desk.tell(Happening::ReferenceCheck(check));
+                }
+                judgement.go_on
+            }
+        };
+        let now = self.now();
+        self.machine.handle(now, Input::Judged(go_on));
+    }
+
+    fn note(&mut self, kind: EventKind, text: &str) {
+        let (session, time_s) = (self.session, self.progress.rig_s);
+        self.record(Record::Event(journal::Event { session, time_s, kind, text: text.to_owned() }));
+    }
+
+    fn record(&mut self, record: Record) {
+        if self.lost.is_some() {
+            return;
+        }
+        if let Err(error) = self.journal.push(record) {
+            self.journal_failed(error);
+        }
+    }
+
+    /// What can't be kept is not worth measuring.
+    fn journal_failed(&mut self, error: JournalError) {
+        if self.lost.is_none() {
+            let fault = Fault::Journal(error.to_string());
+            self.lost = Some(error);
+            let now = self.now();
+            self.machine.handle(now, Input::Fault(fault));
+        }
+    }
+
+    fn tell_link(&mut self) {
+        if let Some(native) = &self.hardware.native {
+            let statistics = native.statistics();
+            self.desk.tell(Happening::Link(statistics));
+        }
+    }
+
+    async fn end(mut self, outcome: Outcome) -> Ended {
+        if self.boot_id.is_some() {
+            let reason = match &outcome {
+                Outcome::Faulted(fault) => format!("faulted: {fault}"),
+                other => other.name().to_owned(),
+            };
+            let (number, ended_s) = (self.session, self.progress.rig_s);
+            self.record(Record::SessionEnded { number, ended_s, reason });
+        }
+        if self.lost.is_none() {
+            self.lost = self.journal.flush().await.err();
+        }
+        self.desk.tell(Happening::Finished(outcome.clone()));
+        let Progress { done, total, rig_s, .. } = self.progress;
+        let (journal, lost, unreached) = (self.journal, self.lost, self.unreached);
+        Ended { outcome, done, total, rig_s, journal, lost, unreached }
+    }
+}
