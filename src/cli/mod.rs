@@ -1,17 +1,21 @@
 //! The command line: arguments, progress, exit codes. The one place where wall time is read and
 //! where a simulated rig is put together; after it there are types.
 
+mod acquire;
 mod args;
 mod explain;
 mod export;
 mod failure;
 mod fit;
+mod folder;
 mod inputs;
 mod nominal;
 mod output;
 mod plan;
 mod ports;
+mod progress;
 mod results;
+mod run;
 mod session;
 mod setup;
 mod simulated;
@@ -33,6 +37,7 @@ pub fn main() -> ExitCode {
         Command::Ports(args) => ports::ports(&args),
         Command::Fit(args) => fit::fit(&args),
         Command::Export(args) => export::export(&args),
+        Command::Run(args) => run::run(&args),
         Command::Plan(args) => plan::plan(&args),
         _ => Err(Failure::start("not in this build")),
     };

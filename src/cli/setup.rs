@@ -214,6 +214,7 @@ fn read_stage(
             ));
         }
     };
+    super::run::check_simulated(plan)?;
     Ok(Some(stage_at(inputs, &path, rig, seed)?))
 }
 

@@ -14,7 +14,7 @@ use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs};
 use super::output::say;
 use super::setup::{Stage, rig_at, stage_at};
-use crate::device::Link;
+use crate::device::{Link, Opener, opener};
 
 /// Bytes that wait between host and wire: as much as a serial port's driver buffers.
 const STREAM_BYTES: usize = 4096;
@@ -43,12 +43,14 @@ impl SimulatedDevice {
         Self { streams }
     }
 
-    /// A link to it. The one before, if any, must have been dropped.
-    pub(crate) fn link(&self) -> Link {
-        let (host, device) = duplex(STREAM_BYTES);
-        // A device whose task has ended leaves the stream closed, which the driver notices.
-        let _ = self.streams.send(device);
-        Link::new("simulated rig", host)
+    /// Links to it, as often as they are asked for. The one before must have been dropped.
+    pub(crate) fn opener(self) -> Opener {
+        opener(move || {
+            let (host, device) = duplex(STREAM_BYTES);
+            // A device whose task has ended leaves the stream closed, which the driver notices.
+            let _ = self.streams.send(device);
+            std::future::ready(Ok(Link::new("simulated rig", host)))
+        })
     }
 }
 

@@ -27,9 +27,10 @@ pub const LADDER: [Rung; 5] = [
 const STEP_DEG_MIN: f64 = 0.01;
 
 impl Rung {
-    /// The plan with its number of targets and its dwell scaled. Steps in φ and C keep dividing
+    /// The plan with its number of targets and its dwell scaled, and with its angular degree as the
+    /// spacing of the targets allows: denser targets resolve more. Steps in φ and C keep dividing
     /// the circle; the grid over the sample stays, since it is the fit's degree in position that
-    /// asks for it. A list of poses has no density: it stays as it is, and only its dwell scales.
+    /// asks for it. A list of poses has no density: only its dwell scales.
     #[must_use]
     pub fn apply(&self, plan: &Plan) -> Plan {
         let mut plan = plan.clone();
@@ -56,6 +57,9 @@ impl Rung {
             }
             list @ Schedule::List { .. } => list,
         };
+        if plan.list_file().is_none() {
+            plan.fit.angular_degree = scaled_degree(plan.fit.angular_degree, finer);
+        }
         plan.dwell = whole_micros(plan.dwell.mul_f64(self.dwell));
         plan
     }
@@ -69,6 +73,11 @@ impl Rung {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is positive
 fn scaled_count(count: u32, factor: f64) -> u32 {
     (libm::round(f64::from(count) * factor) as u32).max(1)
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small and positive
+fn scaled_degree(degree: usize, finer: f64) -> usize {
+    libm::floor(degree as f64 * finer) as usize
 }
 
 /// The wire counts microseconds.

@@ -1,0 +1,65 @@
+//! A run's folder: made anew, never overwritten, and taken away again if the run could not begin.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use super::failure::Failure;
+use super::results::write_inputs;
+use super::session::{utc_now, utc_stamp};
+use super::setup::Setup;
+use crate::journal::{Header, Journal};
+
+/// The file that all else can be made from.
+pub(crate) const JOURNAL: &str = "run.sqlite";
+
+/// The folder where the command line names none: runs/NAME-UTC.
+pub(crate) fn default_folder(name: &str) -> PathBuf {
+    Path::new("runs").join(format!("{name}-{}", utc_stamp()))
+}
+
+/// What is known of a run when it begins.
+pub(crate) fn header(setup: &Setup) -> Header {
+    let effects = setup.stage.as_ref().map_or_else(Vec::new, |stage| {
+        let rows = stage.compiled.effects().iter().filter(|row| row.included);
+        rows.map(|row| format!("{}: {}", row.name, row.cause)).collect()
+    });
+    Header {
+        program_version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: setup.seed,
+        simulated: setup.rig.is_simulated(),
+        rig_name: setup.rig.name.clone(),
+        plan_name: setup.plan_name.clone(),
+        plan_hash: setup.plan_hash.to_string(),
+        started_utc: utc_now(),
+        effects,
+    }
+}
+
+/// Makes the folder with the copies of its inputs and the journal, from which the run can be
+/// carried on as soon as this returns. Where that fails nothing is left behind.
+pub(crate) fn create(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {
+    let shown = folder.display();
+    if let Some(parent) = folder.parent() {
+        std::fs::create_dir_all(parent)
+            .map_err(|error| Failure::start(format!("{}: {error}", parent.display())))?;
+    }
+    std::fs::create_dir(folder).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Failure::with_help(
+            format!("{shown}: exists already; a run is never overwritten"),
+            "choose another folder with --out, or carry the run on with `gonio resume`",
+        ),
+        _ => Failure::start(format!("{shown}: {error}")),
+    })?;
+    fill(folder, setup).inspect_err(|_| {
+        // Made a moment ago, by us; what is in it is of no use.
+        let _ = std::fs::remove_dir_all(folder);
+    })
+}
+
+fn fill(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {
+    write_inputs(folder, setup).map_err(Failure::start)?;
+    let header = header(setup);
+    let journal =
+        Journal::create(&folder.join(JOURNAL), &header, &setup.inputs, &setup.sequence.steps)?;
+    Ok((journal, header))
+}

@@ -1,0 +1,97 @@
+//! The line that shows how far a run is: on standard error, and only on a terminal.
+
+use std::io::IsTerminal as _;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::acquire::Pace;
+use super::setup::Setup;
+use super::text::duration;
+use crate::rig::{Detector, Reading, ReadingKind, Rig};
+use crate::run::Happening;
+
+/// A bar with the time that is left, the pose and the reading.
+pub(crate) struct ProgressLine {
+    bar: ProgressBar,
+    rig: Rig,
+    pace: Pace,
+    /// Of each gain range, the last dark level, counts: good enough to look at.
+    darks: Vec<f64>,
+    rest_s: f64,
+    rig_s: f64,
+}
+
+impl ProgressLine {
+    /// A line for the setup's steps; it does nothing where nobody looks.
+    pub(crate) fn new(setup: &Setup, pace: Pace) -> Self {
+        let target = if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr_with_hz(10)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(Some(setup.sequence.steps.len() as u64), target);
+        if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}") {
+            bar.set_style(style);
+        }
+        let darks = vec![0.0; setup.rig.detector.gains.len()];
+        Self { bar, rig: setup.rig.clone(), pace, darks, rest_s: 0.0, rig_s: 0.0 }
+    }
+
+    /// A line of its own, above the bar, that stays.
+    pub(crate) fn say(&self, text: &str) {
+        if self.bar.is_hidden() { eprintln!("{text}") } else { self.bar.println(text) }
+    }
+
+    /// Shows what happened.
+    pub(crate) fn show(&mut self, happening: &Happening) {
+        match happening {
+            Happening::Fault(fault) => self.say(&format!("fault: {fault}")),
+            Happening::Finished(_) => self.bar.finish_and_clear(),
+            Happening::Progress(progress) => {
+                (self.rest_s, self.rig_s) = (progress.rest_s, progress.rig_s);
+                self.bar.set_length(progress.total as u64);
+                self.bar.set_position(progress.done as u64);
+            }
+            Happening::Reading(reading) => self.show_reading(reading),
+            _ => {}
+        }
+    }
+
+    fn show_reading(&mut self, reading: &Reading) {
+        if reading.kind == ReadingKind::Dark
+            && let Some(dark) = self.darks.get_mut(usize::from(reading.gain))
+        {
+            *dark = reading.mean;
+        }
+        if self.bar.is_hidden() {
+            return;
+        }
+        let left = match self.pace {
+            Pace::Real => format!("{} left", duration(self.rest_s)),
+            Pace::Virtual => {
+                format!("rig {} of {}", duration(self.rig_s), duration(self.rig_s + self.rest_s))
+            }
+        };
+        let (_, pose) = self.rig.measured(reading);
+        self.bar.set_message(format!(
+            "{left} · θ {:.2}° φ {:.2}° x {:.2} mm y {:.2} mm · {}",
+            pose.theta_rad.to_degrees(),
+            pose.phi_rad.to_degrees(),
+            pose.x_m * 1e3,
+            pose.y_m * 1e3,
+            self.radiance(reading),
+        ));
+    }
+
+    /// By the last dark level; calibration, after the run, does it properly.
+    fn radiance(&self, reading: &Reading) -> String {
+        let detector: &Detector = &self.rig.detector;
+        if reading.kind == ReadingKind::Dark {
+            return "dark".to_owned();
+        }
+        let dark = self.darks.get(usize::from(reading.gain)).copied().unwrap_or_default();
+        let current = (reading.mean - dark) * detector.lsb_a(reading.gain);
+        let [unit, ..] = detector.quantity.units();
+        format!("{:.4e} {unit}", current / detector.a_per_radiance())
+    }
+}

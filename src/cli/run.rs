@@ -1,0 +1,122 @@
+//! `gonio run` and `gonio resume`: acquire, journal, fit, export.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::acquire::{Acquired, Pace, acquire, exit_code};
+use super::args::RunArgs;
+use super::failure::{Failure, Outcome};
+use super::folder::{create, default_folder};
+use super::results::{Results, targets_planned};
+use super::setup::Setup;
+use super::summary::Summary;
+use crate::journal::Order;
+use crate::plan::{DarkMethod, Plan};
+use crate::run::{self, Job, OnFault};
+
+/// How the person wants the end of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ending {
+    pub(crate) is_strict: bool,
+    pub(crate) is_json: bool,
+}
+
+/// The main job.
+pub(crate) fn run(args: &RunArgs) -> Outcome {
+    let began = Instant::now();
+    let setup = Setup::from_disk(&args.plan, &args.rig)?;
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(&setup.plan_name));
+    refuse_existing(&folder)?;
+    let pace = Pace::of(&setup, args.realtime);
+    let acquired = acquire(&setup, pace, || {
+        let (journal, _) = create(&folder, &setup)?;
+        Ok((journal, first_job(&setup, OnFault::Finish)))
+    })?;
+    let ending = Ending { is_strict: args.strict, is_json: args.json };
+    finish(&folder, &setup, acquired, began, ending)
+}
+
+/// A run from its beginning.
+pub(crate) fn first_job(setup: &Setup, on_fault: OnFault) -> Job {
+    let mut job = Job::new(setup.sequence.steps.clone(), on_fault);
+    job.warm_up = setup.plan.warm_up.map(|gate| (gate, setup.sequence.warm_up(0), 0));
+    job.rig_time_max = setup.plan.stop.rig_time_max;
+    job
+}
+
+fn refuse_existing(folder: &Path) -> Result<(), Failure> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    Err(Failure::with_help(
+        format!("{}: exists already; a run is never overwritten", folder.display()),
+        "choose another folder with --out, or carry the run on with `gonio resume`",
+    ))
+}
+
+/// Evaluates the journal, writes the folder's files, and prints the summary.
+pub(crate) fn finish(
+    folder: &Path,
+    setup: &Setup,
+    acquired: Acquired,
+    began: Instant,
+    ending: Ending,
+) -> Outcome {
+    let Acquired { outcome, rig_s, journal } = acquired;
+    let journal = journal
+        .map_err(|error| Failure::midway(format!("{error}\n  help: {}", resume_line(folder))))?;
+    let is_complete = outcome == run::Outcome::Complete;
+    let readings = journal.reader().readings(Order::Taken)?;
+    let results = match Results::of(setup, setup.plan.fit, &readings) {
+        // Too little was measured to say anything.
+        Err(_) if !is_complete => return Err(interrupted(folder, &outcome)),
+        results => results?,
+    };
+    results.write(folder, setup, &journal.reader().header()?, &readings)?;
+    journal.close().map_err(Failure::midway)?;
+    let summary = Summary {
+        folder,
+        setup,
+        results: &results,
+        outcome: outcome.name(),
+        rig_s,
+        wall_s: began.elapsed().as_secs_f64(),
+    };
+    if ending.is_json {
+        println!("{}", summary.json());
+    } else {
+        print!("{}", summary.text());
+    }
+    if !is_complete {
+        return Err(interrupted(folder, &outcome));
+    }
+    let n_excluded = results.fitted.as_ref().map_or(usize::MAX, |fitted| fitted.n_excluded);
+    let is_whole = results.calibrated.samples.len() == targets_planned(setup) && n_excluded == 0;
+    Ok(exit_code(is_whole && !(ending.is_strict && results.n_flagged() > 0)))
+}
+
+fn interrupted(folder: &Path, outcome: &run::Outcome) -> Failure {
+    let why = match outcome {
+        run::Outcome::Faulted(fault) => format!("the run stopped: {fault}"),
+        other => format!("the run is not complete: {}", other.name()),
+    };
+    Failure::midway(format!("{why}\n  help: {}", resume_line(folder)))
+}
+
+/// What carries the run on.
+fn resume_line(folder: &Path) -> String {
+    format!("carry it on with `gonio resume {}`", folder.display())
+}
+
+/// A plan that a simulated rig can't follow.
+pub(crate) fn check_simulated(plan: &Plan) -> Result<(), Failure> {
+    if plan.dark.method == DarkMethod::Shutter {
+        return Ok(());
+    }
+    Err(Failure::from(plan.document().root().problem(
+        "dark",
+        "source-off asks a person to switch the source, and a simulated rig has none",
+        "method = \"shutter\" on a simulated rig",
+        "use the shutter",
+    )))
+}
