@@ -1,8 +1,6 @@
 //! What leaves the sample, exactly: the numbers that a fit is compared with, by the same
 //! definitions. Free of detector, noise and beam.
 
-use radiometry::quadrature::gauss_legendre;
-
 use crate::Scene;
 
 /// Where a fit is asked for: a rectangle of the sample and the cone of directions around its
@@ -91,48 +89,6 @@ impl<'c> Truth<'c> {
             let higher = Peak { value, x_m, y_m, theta_rad, phi_rad };
             Some(if value > peak.value { higher } else { peak })
         })
-    }
-
-    /// The throughput-weighted RMS of `fitted` (x, y, θ, φ) less the true radiance over the
-    /// region, divided by the throughput-weighted RMS of the truth. A midpoint rule in position
-    /// (`across` by `across` points) and Gauss-Legendre in sin²θ, which the weight cos θ dω asks
-    /// for; zero for a dark region that is fitted as dark.
-    pub fn radiance_error_rms_relative(
-        &self,
-        across: u32,
-        fitted: impl Fn(f64, f64, f64, f64) -> f64,
-    ) -> f64 {
-        let (mut error, mut size) = (0.0, 0.0);
-        self.for_each_ray(across, |weight, (x, y, theta, phi)| {
-            let truth = self.radiance(x, y, theta, phi);
-            let off = fitted(x, y, theta, phi) - truth;
-            error += weight * off * off;
-            size += weight * truth * truth;
-        });
-        if error > 0.0 { libm::sqrt(error / size) } else { 0.0 }
-    }
-
-    fn for_each_ray(&self, across: u32, mut visit: impl FnMut(f64, (f64, f64, f64, f64))) {
-        const RINGS: usize = 24;
-        const SECTORS: u32 = 48;
-        let Region { x_m, y_m, theta_max_rad } = self.region;
-        let step = |low: f64, high: f64, i: u32| {
-            low + (high - low) * (f64::from(i) + 0.5) / f64::from(across)
-        };
-        let sin_max = libm::sin(theta_max_rad);
-        for (node, weight) in gauss_legendre(RINGS) {
-            let theta = libm::asin(sin_max * libm::sqrt(f64::midpoint(1.0, node)));
-            for sector in 0..SECTORS {
-                let turn = (f64::from(sector) + 0.5) / f64::from(SECTORS) - 0.5;
-                let phi = core::f64::consts::TAU * turn;
-                for i in 0..across {
-                    for j in 0..across {
-                        let (x, y) = (step(x_m.0, x_m.1, i), step(y_m.0, y_m.1, j));
-                        visit(weight, (x, y, theta, phi));
-                    }
-                }
-            }
-        }
     }
 
     fn exitance_up_to(&self, theta_max_rad: f64) -> f64 {
