@@ -8,6 +8,7 @@ mod export;
 mod failure;
 mod fit;
 mod folder;
+mod frontier;
 mod inputs;
 mod nominal;
 mod output;
@@ -38,6 +39,7 @@ pub fn main() -> ExitCode {
         Command::Fit(args) => fit::fit(&args),
         Command::Export(args) => export::export(&args),
         Command::Run(args) => run::run(&args),
+        Command::Frontier(args) => frontier::frontier(&args),
         Command::Plan(args) => plan::plan(&args),
         _ => Err(Failure::start("not in this build")),
     };

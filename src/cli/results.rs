@@ -16,7 +16,7 @@ use crate::journal::{Header, InputRole, Order, Reader};
 use crate::plan::FitSpec;
 use crate::rig::Reading;
 use crate::rig::calibration::{Calibrated, Fitted, calibrate};
-use crate::study::radiance_error_rms_relative;
+use crate::study::Score;
 
 /// Points of the accuracy curve at most: each is a fit of its own.
 const ACCURACY_POINTS: u32 = 12;
@@ -28,6 +28,8 @@ pub(crate) struct Results {
     /// The fit, or why there is none.
     pub(crate) fitted: Result<Fitted, FitError>,
     pub(crate) truth: Option<Truth>,
+    /// How far the fit lies from the truth, where there is both, and any light.
+    pub(crate) score: Option<Score>,
     pub(crate) accuracy: Vec<AccuracyPoint>,
 }
 
@@ -41,9 +43,10 @@ impl Results {
         if let Ok(fitted) = &fitted {
             calibrated.restate_from(&fitted.fit);
         }
-        let truth = fitted.as_ref().ok().and_then(|fitted| truth(setup, &region, fitted));
+        let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
+        let (truth, score) = compared.unzip();
         let accuracy = accuracy(&calibrated, &region, basis);
-        Ok(Self { calibrated, fitted, truth, accuracy })
+        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy })
     }
 
     /// Samples that carry a flag.
@@ -160,11 +163,12 @@ fn basis(spec: FitSpec) -> BasisSpec {
     BasisSpec { angular_degree: spec.angular_degree, position_degree: spec.position_degree }
 }
 
-fn truth(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<Truth> {
+/// What is true, and how far the fit lies from it.
+fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Option<Score>)> {
     let truth = setup.truth()?;
     let radiance = |ray: &fit::Ray| truth.radiance(ray.x_m, ray.y_m, ray.theta_rad, ray.phi_rad);
-    let error = radiance_error_rms_relative(region, |ray| fitted.fit.value(ray), radiance);
-    Some(Truth {
+    let score = Score::of(region, |ray| fitted.fit.value(ray), radiance);
+    let stated = Truth {
         exitance: truth.exitance(),
         exitance_within_region: truth.exitance_within_region(),
         flux: truth.flux(),
@@ -178,8 +182,9 @@ fn truth(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<Truth> {
             },
         }),
         // A sample without any light has no relative error; a fit that is dark too has none.
-        radiance_error_rms_relative: error.unwrap_or(0.0),
-    })
+        radiance_error_rms_relative: score.map_or(0.0, |score| score.rms_relative),
+    };
+    Some((stated, score))
 }
 
 /// Fits of the first readings, ever more of them: half as many for each point further back.

@@ -9,6 +9,7 @@
 mod accuracy;
 mod atomic;
 mod fit_file;
+mod frontier;
 mod input;
 mod number;
 mod readings;
@@ -20,6 +21,7 @@ mod tests;
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, write_atomically};
 pub use fit_file::{FitFile, TruePeak, Truth};
+pub use frontier::write_frontier;
 pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};
 pub use readings::write_readings;
 pub use samples::{RayColumns, write_samples};

@@ -101,6 +101,25 @@ pub fn doubling(lower: &FrontierPoint, upper: &FrontierPoint) -> Option<String> 
     ))
 }
 
+/// How honest the stated uncertainty of the exitance is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// RMS of error over stated standard uncertainty: 1 for an honest one.
+    pub rms_of_error_over_u: f64,
+    /// How much of the runs has the truth within two stated uncertainties.
+    pub within_2u: f64,
+}
+
+/// Over all rows, at least one.
+pub fn coverage(rows: &[FrontierRow]) -> Coverage {
+    let count = rows.len() as f64;
+    // The error is relative to the truth and u to the fit: the same but for second order.
+    let in_u = rows.iter().map(|row| row.error_exitance_relative / row.u_exitance_relative);
+    let squares: f64 = in_u.clone().map(|z| z * z).sum();
+    let within = in_u.filter(|z| z.abs() <= 2.0).count();
+    Coverage { rms_of_error_over_u: libm::sqrt(squares / count), within_2u: within as f64 / count }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,6 +154,15 @@ mod tests {
         assert_eq!(points[0].parameters, "a");
         assert_eq!(points[0].radiance, [0.02, 0.03, 0.04]);
         assert!((points[0].exitance_rms - libm::sqrt(0.001)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn coverage_counts_what_lies_within_two_u() {
+        let mut rows = [row("a", 1, 1.0, 0.01), row("a", 2, 1.0, 0.01)];
+        rows[1].error_exitance_relative = 0.03;
+        let coverage = coverage(&rows);
+        assert!((coverage.within_2u - 0.5).abs() < 1e-15);
+        assert!((coverage.rms_of_error_over_u - libm::sqrt(5.0)).abs() < 1e-12);
     }
 
     #[test]

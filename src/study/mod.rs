@@ -5,6 +5,6 @@ mod frontier;
 mod ladder;
 mod score;
 
-pub use frontier::{FrontierPoint, FrontierRow, doubling, points};
+pub use frontier::{Coverage, FrontierPoint, FrontierRow, coverage, doubling, points};
 pub use ladder::{LADDER, Rung};
-pub use score::radiance_error_rms_relative;
+pub use score::Score;

@@ -12,24 +12,56 @@ const PHI_NODES: u32 = 48;
 const POSITION_PARTS: u32 = 3;
 const POSITION_NODES: usize = 2;
 
-/// The throughput-weighted RMS of `fitted - truth` over the region, divided by that of `truth`:
-/// a number without a unit, zero for a perfect fit. The weight is dT = cos θ dω dA, over the
-/// region's rectangle and the cone from the normal to its largest θ.
-///
-/// A product rule: Gauss-Legendre in sin²θ and in thirds of x and y, the trapezoid rule in φ.
-/// Features narrower than its spacing (7.5° in φ) are seen only in part, and an emitter's outline
-/// inside the region to a sixth of the region. A truth that vanishes everywhere has no
-/// relative error: the answer is `None`.
-pub fn radiance_error_rms_relative(
+/// How far a fit lies from the truth: throughput-weighted RMS over a region, each divided by the
+/// truth's own, so numbers without a unit. The weight is dT = cos θ dω dA, over the region's
+/// rectangle and the cone from the normal to its largest θ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Of `fitted - truth`.
+    pub rms_relative: f64,
+    /// The same once the best common factor is taken out of the fit: what a calibration of the
+    /// scale could not mend. 1 for a fit that has nothing of the truth.
+    pub shape_rms_relative: f64,
+}
+
+impl Score {
+    /// By a product rule: Gauss-Legendre in sin²θ and in thirds of x and y, the trapezoid rule
+    /// in φ. Features narrower than its spacing (7.5° in φ) are seen only in part, and an
+    /// emitter's outline inside the region to a sixth of the region. A truth that vanishes
+    /// everywhere has no relative error: the answer is `None`.
+    pub fn of(
+        region: &Region,
+        fitted: impl Fn(&Ray) -> f64,
+        truth: impl Fn(&Ray) -> f64,
+    ) -> Option<Self> {
+        let pairs = pairs(region, fitted, truth);
+        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+            pairs.iter().map(|(weight, fitted, truth)| weight * f(*fitted, *truth)).sum()
+        };
+        let signal = sum(&|_, truth| truth * truth);
+        if signal <= 0.0 {
+            return None;
+        }
+        let size = sum(&|fitted, _| fitted * fitted);
+        let factor = if size > 0.0 { sum(&|fitted, truth| fitted * truth) / size } else { 0.0 };
+        let rms = |factor: f64| {
+            let error = sum(&|fitted, truth| (factor * fitted - truth) * (factor * fitted - truth));
+            libm::sqrt(error / signal)
+        };
+        Some(Self { rms_relative: rms(1.0), shape_rms_relative: rms(factor) })
+    }
+}
+
+/// Weight, fitted and true radiance at every node.
+fn pairs(
     region: &Region,
     fitted: impl Fn(&Ray) -> f64,
     truth: impl Fn(&Ray) -> f64,
-) -> Option<f64> {
+) -> Vec<(f64, f64, f64)> {
     let sin_max = libm::sin(region.theta_max_rad);
     let scale = |(low, high): (f64, f64), t: f64| low + (high - low) * 0.5 * (1.0 + t);
     let positions = position_nodes();
-    let mut error = 0.0;
-    let mut signal = 0.0;
+    let mut pairs = Vec::new();
     for (t, weight_theta) in gauss_legendre(THETA_NODES) {
         let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin_max * sin_max), t)));
         for k in 0..PHI_NODES {
@@ -40,15 +72,12 @@ pub fn radiance_error_rms_relative(
                     let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
                     let ray = Ray { x_m, y_m, theta_rad, phi_rad };
                     let weight = weight_theta * weight_x * weight_y;
-                    let expected = truth(&ray);
-                    let difference = fitted(&ray) - expected;
-                    error += weight * difference * difference;
-                    signal += weight * expected * expected;
+                    pairs.push((weight, fitted(&ray), truth(&ray)));
                 }
             }
         }
     }
-    (signal > 0.0).then(|| libm::sqrt(error / signal))
+    pairs
 }
 
 /// Nodes in [-1, 1] and their weights.
@@ -75,16 +104,16 @@ mod tests {
     #[test]
     fn a_constant_relative_error_is_itself() {
         let truth = |ray: &Ray| 3.0 + ray.x_m + libm::cos(ray.theta_rad);
-        let error = radiance_error_rms_relative(&REGION, |ray| 1.01 * truth(ray), truth).unwrap();
-        assert!((error - 0.01).abs() < 1e-14, "{error}");
+        let score = Score::of(&REGION, |ray| 1.01 * truth(ray), truth).unwrap();
+        assert!((score.rms_relative - 0.01).abs() < 1e-13, "{score:?}");
+        assert!(score.shape_rms_relative < 1e-12, "{score:?}");
     }
 
     #[test]
     fn the_weight_is_throughput() {
         // RMS of cos θ under cos θ dω over the hemisphere: sqrt(∫ cos³ / ∫ cos) = sqrt(1/2).
-        let error =
-            radiance_error_rms_relative(&REGION, |ray| 1.0 + libm::cos(ray.theta_rad), |_| 1.0);
-        assert!((error.unwrap() - libm::sqrt(0.5)).abs() < 1e-12, "{error:?}");
+        let score = Score::of(&REGION, |ray| 1.0 + libm::cos(ray.theta_rad), |_| 1.0).unwrap();
+        assert!((score.rms_relative - libm::sqrt(0.5)).abs() < 1e-12, "{score:?}");
     }
 
     #[test]
@@ -93,7 +122,7 @@ mod tests {
         for share in [0.2, 0.35, 0.5, 0.65, 0.8] {
             let edge_m = REGION.x_m.0 + share * (REGION.x_m.1 - REGION.x_m.0);
             let patch = |ray: &Ray| f64::from(ray.x_m < edge_m);
-            let error = radiance_error_rms_relative(&REGION, |_| 1.0, patch).unwrap();
+            let error = Score::of(&REGION, |_| 1.0, patch).unwrap().rms_relative;
             let seen = 1.0 / (1.0 + error * error);
             assert!((seen - share).abs() < 1.0 / 6.0, "{seen} of {share}");
         }
@@ -101,6 +130,6 @@ mod tests {
 
     #[test]
     fn a_dark_truth_has_no_relative_error() {
-        assert_eq!(radiance_error_rms_relative(&REGION, |_| 1.0, |_| 0.0), None);
+        assert_eq!(Score::of(&REGION, |_| 1.0, |_| 0.0), None);
     }
 }
