@@ -16,6 +16,7 @@ pub mod machine;
 mod owner;
 mod pace;
 mod reading;
+pub mod resume;
 mod state;
 mod warm_up;
 

@@ -4,3 +4,4 @@ mod bench;
 mod board;
 mod driver;
 mod engine;
+mod resume;

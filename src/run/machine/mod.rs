@@ -7,6 +7,8 @@
 //! acknowledged only after its `Record` was taken over.
 
 mod advance;
+#[cfg(test)]
+mod bench_tests;
 mod request;
 #[cfg(test)]
 mod tests;
