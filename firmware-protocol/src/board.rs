@@ -55,6 +55,11 @@ pub trait Board {
         None
     }
 
+    /// The axis sets out, and comes to rest at the setpoint `towards` unless it is braked before.
+    /// From here a board that knows its own faults beforehand can tell when to be asked.
+    fn begin_motion(&mut self, now: Instant, channel: u8, towards: f64) {
+        let _ = (now, channel, towards);
+    }
     /// Puts the axis's setpoint, in counts from its home mark (before homing: from where it
     /// stood at boot). Fractions matter to a simulated board; a stepper rounds them. Called at
     /// the end of every motion with its exact target, before anything is read while an axis

@@ -99,7 +99,7 @@ impl Axes {
     }
 
     /// Sets out for the targets: all axes start now, and arrive together when the slowest can.
-    pub(super) fn go_to(&mut self, now: Instant, targets: &AxisCounts) {
+    pub(super) fn go_to(&mut self, now: Instant, targets: &AxisCounts, board: &mut impl Board) {
         let mut profiles: Vec<(Trapezoid, f64, f64), AXES_MAX> = Vec::new();
         let mut duration_us = 0;
         for ((axis, path), &target) in self.identities.iter().zip(&self.paths).zip(&targets.0) {
@@ -111,13 +111,14 @@ impl Axes {
             duration_us = duration_us.max(whole_micros(profile.duration_s()));
             let _ = profiles.push((profile, from, to));
         }
-        for (path, (profile, from, to)) in self.paths.iter_mut().zip(profiles) {
+        for ((channel, path), (profile, from, to)) in (0..).zip(&mut self.paths).zip(profiles) {
             *path = Path::leg(from, to, profile, now, duration_us);
+            announce(path, now, channel, board);
         }
     }
 
     /// Sets out for one place at homing speed. Limits do not hold before an axis is homed.
-    pub(super) fn creep_to(&mut self, now: Instant, channel: u8, to: f64) {
+    pub(super) fn creep_to(&mut self, now: Instant, channel: u8, to: f64, board: &mut impl Board) {
         let index = usize::from(channel);
         let (Some(axis), Some(path)) = (self.identities.get(index), self.paths.get_mut(index))
         else {
@@ -127,6 +128,7 @@ impl Axes {
         let creeping = HOMING_SPEED * speed(axis);
         if let Some(profile) = Trapezoid::new((to - from).abs(), creeping, acceleration(axis)) {
             *path = Path::leg(from, to, profile, now, whole_micros(profile.duration_s()));
+            announce(path, now, channel, board);
         }
     }
 
@@ -163,6 +165,13 @@ impl Axes {
         for (axis, path) in self.identities.iter().zip(&mut self.paths) {
             *path = path.braked(now, acceleration(axis));
         }
+    }
+}
+
+/// Tells the board of a path that goes anywhere.
+fn announce(path: &Path, now: Instant, channel: u8, board: &mut impl Board) {
+    if path.end().is_some() {
+        board.begin_motion(now, channel, path.destination());
     }
 }
 

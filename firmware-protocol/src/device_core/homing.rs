@@ -57,10 +57,10 @@ impl Homing {
             axes.unhome(channel);
             board.begin_search(now, channel);
             let stage = if let Some(mark) = board.home_mark(now, channel) {
-                axes.creep_to(now, channel, mark);
+                axes.creep_to(now, channel, mark, board);
                 Stage::Returning
             } else {
-                axes.creep_to(now, channel, end);
+                axes.creep_to(now, channel, end, board);
                 Stage::Searching { other_end: Some(other_end) }
             };
             let _ = seekers.push(Seeker { channel, stage });
@@ -136,18 +136,18 @@ impl Seeker {
                     Some(Stage::Overrunning { mark })
                 } else if axes.rests(channel) {
                     let end = other_end.ok_or(Cause::HomingMissed(channel))?;
-                    axes.creep_to(now, channel, end);
+                    axes.creep_to(now, channel, end, board);
                     Some(Stage::Searching { other_end: None })
                 } else {
                     None
                 }
             }
             Stage::Turning { other_end } if axes.rests(channel) => {
-                axes.creep_to(now, channel, other_end);
+                axes.creep_to(now, channel, other_end, board);
                 Some(Stage::Searching { other_end: None })
             }
             Stage::Overrunning { mark } if axes.rests(channel) => {
-                axes.creep_to(now, channel, mark);
+                axes.creep_to(now, channel, mark, board);
                 Some(Stage::Returning)
             }
             Stage::Returning if axes.rests(channel) => {

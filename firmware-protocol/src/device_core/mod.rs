@@ -317,7 +317,7 @@ impl<B: Board> DeviceCore<B> {
                 Work::Homing(Homing::begin(home.axes, now, &mut self.axes, &mut self.board))
             }
             Command::MoveTo(move_to) => {
-                self.axes.go_to(now, &move_to.targets);
+                self.axes.go_to(now, &move_to.targets, &mut self.board);
                 Work::Moving
             }
             Command::Dwell(dwell) => Work::Dwelling(Dwelling::begin(dwell, now, &mut self.board)),
