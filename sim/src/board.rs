@@ -116,6 +116,16 @@ impl Board for SimulatedBoard {
         true
     }
 
+    fn wake_at(&self) -> Option<Instant> {
+        self.axes.iter().filter_map(Axis::look_at).min()
+    }
+
+    fn begin_motion(&mut self, now: Instant, channel: u8, towards: f64) {
+        if let Some(axis) = self.axis(channel) {
+            axis.begin_motion(now, towards);
+        }
+    }
+
     fn set_setpoint(&mut self, now: Instant, channel: u8, counts: f64) {
         self.dwell.current_a = None;
         if let Some(axis) = self.axis(channel) {
@@ -158,6 +168,7 @@ impl Board for SimulatedBoard {
     }
 
     fn fault(&mut self, _now: Instant) -> Option<BoardFault> {
-        None
+        let opened = self.axes.iter_mut().position(|axis| axis.switches().take_opened())?;
+        Some(BoardFault::LimitSwitch(self.compiled.nominal.axes[opened].channel))
     }
 }

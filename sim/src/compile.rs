@@ -64,7 +64,8 @@ pub fn compile(
     let current_per_radiance = draw_optics(&nominal.detector, seed)?;
     let amplifier = draw_amplifier(&nominal.detector, seed)?;
     let axes = core::array::from_fn(|i| {
-        AxisTruth::draw(AXIS_NAMES[i], &nominal.axes[i], simulated.start[i], seed)
+        let (start, margin) = (simulated.start[i], simulated.limit_margin);
+        AxisTruth::draw(AXIS_NAMES[i], &nominal.axes[i], start, margin, seed)
     });
     let mut compiled = Compiled {
         scene,

@@ -21,6 +21,7 @@ mod rows;
 mod scene;
 mod serve;
 mod simulated;
+mod switches;
 mod truth;
 mod wire;
 

@@ -12,6 +12,7 @@ use glam::{DMat3, DVec3};
 
 use crate::NominalAxis;
 use crate::chance::{draw, mix};
+use crate::switches::Switches;
 
 /// A ray from the sample to the detector: where it leaves, metres, and its direction, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +60,9 @@ pub(crate) struct AxisTruth {
     settle: Option<Settle>,
     /// Where it stands at boot, counts.
     start_counts: f64,
+    /// Where the limit switches stand, counts.
+    switch_counts: (f64, f64),
+    speed_counts_per_s: f64,
 }
 
 /// The true position departs from the reported one by an amount that belongs to the position:
@@ -86,6 +90,7 @@ impl AxisTruth {
         name: &'static str,
         axis: &NominalAxis,
         start: Option<f64>,
+        limit_margin: f64,
         seed: u64,
     ) -> Self {
         let per_unit = axis.counts_per_unit;
@@ -104,15 +109,20 @@ impl AxisTruth {
             time_s: axis.settle_s,
             lag_counts_max: f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s,
         });
+        let mark_counts = zero * axis.u_zero * per_unit;
+        // The travel is stated from the mark, wherever that really is.
+        let beyond = limit_margin * (high - low);
         Self {
             name,
             seed,
             counts_per_unit: per_unit,
-            mark_counts: zero * axis.u_zero * per_unit,
+            mark_counts,
             homing_counts: axis.u_homing * per_unit.abs(),
             scale,
             settle,
             start_counts: libm::round(low + fraction * (high - low)),
+            switch_counts: (mark_counts + low - beyond, mark_counts + high + beyond),
+            speed_counts_per_s: f64::from(axis.speed_counts_per_s),
         }
     }
 
@@ -158,6 +168,7 @@ pub(crate) struct Axis {
     mark_counts: f64,
     /// The setpoints passed since the search began.
     searched: Option<(f64, f64)>,
+    switches: Switches,
 }
 
 impl Axis {
@@ -170,11 +181,29 @@ impl Axis {
             homings: 0,
             mark_counts: truth.mark_found(0),
             searched: None,
+            switches: Switches::new(truth.switch_counts, truth.speed_counts_per_s),
             truth: truth.clone(),
         }
     }
 
+    pub(crate) fn begin_motion(&mut self, now: Instant, towards_counts: f64) {
+        let [from, towards] =
+            [self.setpoint_counts, towards_counts].map(|counts| self.origin_counts + counts);
+        self.switches.begin_motion(now, from, towards);
+    }
+
+    /// The limit switches' view of it: they are passed by the setpoint.
+    pub(crate) const fn switches(&mut self) -> &mut Switches {
+        &mut self.switches
+    }
+
+    /// When to look whether it has reached a limit switch.
+    pub(crate) const fn look_at(&self) -> Option<Instant> {
+        self.switches.look_at()
+    }
+
     pub(crate) fn set_setpoint(&mut self, now: Instant, counts: f64) {
+        self.switches.pass(now, self.origin_counts + counts);
         let moved = counts - self.setpoint_counts;
         if moved == 0.0 {
             return;
@@ -289,7 +318,7 @@ mod tests {
         let mut nominal = axis();
         nominal.u_zero = 0.0;
         nominal.u_homing = 0.0;
-        let truth = AxisTruth::draw("theta", &nominal, Some(0.5), 1);
+        let truth = AxisTruth::draw("theta", &nominal, Some(0.5), 0.01, 1);
         let mut axis = Axis::at_boot(&truth);
         axis.set_setpoint(at(100), 200.0);
         // 9000 counts/s² for (10 ms)²: 0.9 counts behind, and on its way.
@@ -302,7 +331,7 @@ mod tests {
 
     #[test]
     fn a_homed_axis_is_off_by_what_was_drawn() {
-        let truth = AxisTruth::draw("theta", &axis(), None, 3);
+        let truth = AxisTruth::draw("theta", &axis(), None, 0.01, 3);
         let mut axis = Axis::at_boot(&truth);
         axis.begin_search();
         assert_eq!(axis.home_mark(), None);
@@ -326,9 +355,9 @@ mod tests {
         let rms = |values: &dyn Fn(u64) -> f64| {
             libm::sqrt((0..4000).map(|i| values(i) * values(i)).sum::<f64>() / 4000.0)
         };
-        let zero = rms(&|seed| AxisTruth::draw("phi", &nominal, None, seed).mark_counts);
+        let zero = rms(&|seed| AxisTruth::draw("phi", &nominal, None, 0.01, seed).mark_counts);
         assert!((zero / 10.0 - 1.0).abs() < 0.05, "{zero}");
-        let truth = AxisTruth::draw("phi", &nominal, None, 9);
+        let truth = AxisTruth::draw("phi", &nominal, None, 0.01, 9);
         let scale = rms(&|line| truth.scale_error(line as f64 - 2000.0));
         assert!((scale / 2.0 - 1.0).abs() < 0.05, "{scale}");
     }

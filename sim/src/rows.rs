@@ -11,6 +11,7 @@ pub(crate) fn write(compiled: &Compiled) -> Vec<EffectRow> {
     let mut rows = emitters(compiled);
     rows.push(beam(compiled));
     rows.extend(mechanics(compiled));
+    rows.push(limit_switches(compiled));
     rows.extend(optics(compiled));
     rows.extend(currents(compiled));
     rows.extend(converter(compiled));
@@ -96,6 +97,18 @@ fn mechanics(compiled: &Compiled) -> Vec<EffectRow> {
         rows.push(row(format!("{name} settling"), lag > 0.0, cause, Some((lag, unit)), how));
     }
     rows
+}
+
+fn limit_switches(compiled: &Compiled) -> EffectRow {
+    let margin = compiled.simulated.limit_margin;
+    row(
+        "limit switches",
+        true,
+        format!("simulated.limit_margin_fraction_of_travel = {margin}"),
+        None,
+        "open when a setpoint passes them, to the microsecond: a search for a home mark turns \
+         round, any other motion ends in a fault; no reading is taken there",
+    )
 }
 
 fn optics(compiled: &Compiled) -> Vec<EffectRow> {

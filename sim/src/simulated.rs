@@ -3,14 +3,18 @@
 
 use spanned_toml::{Bounds, Problem, Table};
 
-/// What the rig file can't know of a real rig. Everything absent is an effect absent.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// What the rig file can't know of a real rig. Everything absent is an effect absent; but limit
+/// switches every rig has.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
     /// Current without light, amperes; zero for none.
     pub dark_current_a: f64,
     /// Where the axes stand at boot, as fractions of their travel from its lower end, in the
     /// order θ, φ, x, y. Drawn from the middle half of the travel where absent.
     pub start: [Option<f64>; 4],
+    /// How far beyond each end of its travel an axis has a limit switch, as a fraction of the
+    /// travel; 0.01 where absent.
+    pub limit_margin: f64,
     /// What goes wrong on the wire.
     pub faults: LinkFaults,
 }
@@ -31,6 +35,20 @@ impl LinkFaults {
     }
 }
 
+impl Default for Simulated {
+    fn default() -> Self {
+        Self {
+            dark_current_a: 0.0,
+            start: [None; 4],
+            limit_margin: LIMIT_MARGIN,
+            faults: LinkFaults::default(),
+        }
+    }
+}
+
+/// More than an axis overruns its home mark by, and less than homing searches beyond the travel.
+const LIMIT_MARGIN: f64 = 0.01;
+
 /// A photodiode that leaks more than this is broken.
 const DARK_CURRENT_A_MAX: f64 = 1e-3;
 
@@ -50,6 +68,7 @@ impl Simulated {
             }
             axes.finish()?;
         }
+        let limit_margin = table.number("limit_margin_fraction_of_travel", fraction)?;
         let mut faults = LinkFaults::default();
         if let Some(link) = table.table("link")? {
             let rate = Bounds::between(0.0, FAULT_RATE_MAX);
@@ -58,7 +77,8 @@ impl Simulated {
             link.finish()?;
         }
         table.finish()?;
-        Ok(Self { dark_current_a, start, faults })
+        let limit_margin = limit_margin.unwrap_or(LIMIT_MARGIN);
+        Ok(Self { dark_current_a, start, limit_margin, faults })
     }
 }
 
@@ -86,13 +106,20 @@ mod tests {
     #[test]
     fn keys_are_read_and_unknown_ones_refused() {
         let text = "[simulated]\ndark_current_a = 1e-12\nlink.drop_rate = 0.01\n\
-                    start_fraction_of_travel = { theta = 0.5, y = 0 }\n";
+                    start_fraction_of_travel = { theta = 0.5, y = 0 }\n\
+                    limit_margin_fraction_of_travel = 0.02\n";
         let simulated = read(text).unwrap();
         assert_eq!(simulated.start, [Some(0.5), None, None, Some(0.0)]);
         assert!(!simulated.faults.is_none());
+        assert!((simulated.limit_margin - 0.02).abs() < f64::EPSILON);
         let problem = read("[simulated]\ndark_curent_a = 1e-12\n").unwrap_err();
         assert!(problem.to_string().contains("did you mean `dark_current_a`?"), "{problem}");
-        for bad in ["dark_current_a = nan", "link.drop_rate = 0.5", "link.delay = 1"] {
+        for bad in [
+            "dark_current_a = nan",
+            "link.drop_rate = 0.5",
+            "link.delay = 1",
+            "limit_margin_fraction_of_travel = -0.1",
+        ] {
             assert!(read(&format!("[simulated]\n{bad}\n")).is_err(), "{bad}");
         }
     }
