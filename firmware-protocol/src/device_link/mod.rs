@@ -7,7 +7,10 @@ mod replies;
 use heapless::Deque;
 
 use crate::packet::{Foreign, NakReason, PacketError, Said, SessionTag, ToDevice, ToHost};
-use crate::{BadFrames, Decoder, Event, Identity, Instant, Reply, Request, RequestType, WINDOW};
+use crate::{
+    BadFrames, Cause, CommandId, Decoder, Event, Identity, Instant, Rejection, Reply, Request,
+    RequestType, WINDOW,
+};
 use outbox::Outbox;
 use replies::{Place, Replies};
 
@@ -17,6 +20,9 @@ const INBOX: usize = 2 * WINDOW + 2;
 /// Sessions that are remembered after their end, so that a late `Identify` does not bring one
 /// back.
 const PAST: usize = 4;
+
+/// To a `ClearFault` that was said before a `Stop` and comes behind it. It has no command to name.
+const OVERTAKEN: Reply = Reply::Rejected(CommandId(0), Rejection::Faulted(Cause::Stopped));
 
 /// Which request a reply belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +59,8 @@ pub struct DeviceEndpoint {
     nak_due: Option<(NakReason, SessionTag)>,
     /// The number that a resend was asked for, until it comes.
     asked_for: Option<u8>,
+    /// The first number behind a `Stop` that came before the requests in front of it.
+    stopped_before: Option<u8>,
     heard: Instant,
 }
 
@@ -71,6 +79,7 @@ impl DeviceEndpoint {
             stopping_due: None,
             nak_due: None,
             asked_for: None,
+            stopped_before: None,
             heard: Instant::ZERO,
         }
     }
@@ -155,6 +164,9 @@ impl DeviceEndpoint {
         match request {
             Request::Stop => {
                 self.heard = now;
+                if Some(session) == self.tag() {
+                    self.stopped_before = self.replies.is_before(seq).then_some(seq);
+                }
                 self.take(Incoming { reply_to, request });
             }
             Request::Identify(number) => self.handle_identify(now, number, reply_to),
@@ -189,8 +201,12 @@ impl DeviceEndpoint {
         self.identity_due = None;
         self.nak_due = None;
         self.asked_for = None;
-        // A stop that nobody has executed yet stays.
+        self.stopped_before = None;
+        // A stop that nobody has executed yet stays; the last of several does.
         self.inbox.retain(|incoming| incoming.request == Request::Stop);
+        while self.inbox.len() > 1 {
+            self.inbox.pop_front();
+        }
         self.replies = Replies::default();
         self.outbox = Outbox::default();
     }
@@ -204,14 +220,25 @@ impl DeviceEndpoint {
                 if let Request::Acknowledge(id) = incoming.request {
                     self.outbox.acknowledge(id);
                 }
+                let is_overtaken = self.is_overtaken();
                 self.replies.take_next();
                 self.asked_for = None;
-                self.take(incoming);
+                if is_overtaken && incoming.request == Request::ClearFault {
+                    self.replies.answer(seq, OVERTAKEN);
+                } else {
+                    self.take(incoming);
+                }
             }
             Place::Repeat => self.replies.repeat(seq),
             Place::Ahead => self.ask_for_resend(),
             Place::Elsewhere => {}
         }
+    }
+
+    /// Whether a `Stop` that the host said after the next request was executed already.
+    fn is_overtaken(&mut self) -> bool {
+        self.stopped_before = self.stopped_before.filter(|seq| self.replies.is_before(*seq));
+        self.stopped_before.is_some()
     }
 
     fn handle_foreign(&mut self, foreign: Foreign) {

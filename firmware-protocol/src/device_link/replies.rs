@@ -48,6 +48,11 @@ impl Replies {
         }
     }
 
+    /// Whether the request that is executed next was numbered shortly before this number.
+    pub(super) fn is_before(&self, seq: u8) -> bool {
+        (1..=WINDOW).contains(&usize::from(seq.wrapping_sub(self.expected)))
+    }
+
     /// Takes the next request. Who sends it has heard the answer to the one [`WINDOW`] before.
     pub(super) fn take_next(&mut self) {
         if self.answers.is_full() {

@@ -88,13 +88,14 @@ pub struct HostEndpoint {
     phase: Phase,
     identify: Option<Flight>,
     stop: Option<Flight>,
+    /// The session in which the stop was asked for, and in which it is answered.
+    stop_session: SessionTag,
     window: Window,
     trip: RoundTrip,
     delivered: Delivered,
     events: Deque<HostEvent, EVENTS>,
     heard: Heard,
     tickets: u32,
-    stops: u8,
     statistics: LinkStatistics,
 }
 
@@ -109,13 +110,13 @@ impl HostEndpoint {
             phase: Phase::Closed,
             identify: None,
             stop: None,
+            stop_session: SessionTag(0),
             window: Window::default(),
             trip: RoundTrip::new(baud),
             delivered: Delivered::default(),
             events: Deque::new(),
             heard: Heard::default(),
             tickets: 0,
-            stops: 0,
             statistics: LinkStatistics::default(),
         }
     }
@@ -128,7 +129,8 @@ impl HostEndpoint {
     }
 
     /// Takes a request in. `Stop` is always taken, before or without a session too, and goes
-    /// out first; a second one before the answer to the first shares its ticket.
+    /// out first; a second one before the answer to the first shares its ticket, and goes out
+    /// anew if anything else was submitted in between.
     /// `Identify(session)` is [`Self::identify`] with a number of the caller's.
     pub fn submit(&mut self, now: Instant, request: Request) -> Result<Ticket, SubmitError> {
         match request {
@@ -191,10 +193,11 @@ impl HostEndpoint {
     /// gives its length. Call after every other call until it gives `None`; `now` starts the
     /// request's time-out, so call it when the wire is about to take the bytes.
     pub fn poll_transmit(&mut self, now: Instant, out: &mut [u8]) -> Option<usize> {
-        let alone = [&mut self.stop, &mut self.identify];
-        let flight = alone.into_iter().flatten().find(|flight| flight.is_due());
-        let flight = flight.or_else(|| self.window.due())?;
         let session = SessionTag::of(self.session);
+        let alone = [(self.stop_session, &mut self.stop), (session, &mut self.identify)];
+        let alone = alone.into_iter().filter_map(|(session, slot)| Some((session, slot.as_mut()?)));
+        let first = alone.into_iter().find(|(_, flight)| flight.is_due());
+        let (session, flight) = first.or_else(|| Some((session, self.window.due()?)))?;
         let length = packet::encode_request(session, flight.seq, &flight.request, out)?;
         match flight.sends {
             0 => self.statistics.sent += 1,
@@ -241,12 +244,16 @@ impl HostEndpoint {
     }
 
     fn submit_stop(&mut self, now: Instant) -> Ticket {
-        if let Some(flight) = &self.stop {
+        let (session, seq) = (SessionTag::of(self.session), self.window.next_seq());
+        let before = core::mem::replace(&mut self.stop_session, session);
+        if let Some(flight) = &mut self.stop {
+            if (before, flight.seq) != (session, seq) {
+                flight.renumber(seq);
+            }
             return flight.ticket;
         }
         let ticket = self.next_ticket();
-        self.stops = self.stops.wrapping_add(1);
-        self.stop = Some(Flight::new(ticket, self.stops, Request::Stop, now));
+        self.stop = Some(Flight::new(ticket, seq, Request::Stop, now));
         ticket
     }
 
@@ -256,8 +263,13 @@ impl HostEndpoint {
     }
 
     fn handle_packet(&mut self, now: Instant, packet: ToHost) {
-        if packet.session != SessionTag::of(self.session) {
-            self.statistics.stale += 1;
+        let ToHost { session, seq, .. } = packet;
+        if session != SessionTag::of(self.session) {
+            // A stop may be answered in the session before.
+            match packet.message {
+                Said::Reply(Reply::Stopping) => self.handle_stopping(now, session, seq),
+                _ => self.statistics.stale += 1,
+            }
             return;
         }
         if let Phase::Open(boot_id) = self.phase
@@ -270,10 +282,10 @@ impl HostEndpoint {
             Said::Reply(Reply::Identity(identity)) => {
                 self.handle_identity(now, packet.boot_id, identity);
             }
-            Said::Reply(Reply::Stopping) => self.handle_stopping(now, packet.seq),
-            Said::Reply(reply) => self.handle_reply(now, packet.seq, reply),
+            Said::Reply(Reply::Stopping) => self.handle_stopping(now, session, seq),
+            Said::Reply(reply) => self.handle_reply(now, seq, reply),
             Said::Event(event) => self.handle_event(event),
-            Said::Nak(reason) => self.handle_nak(now, reason, packet.seq),
+            Said::Nak(reason) => self.handle_nak(now, reason, seq),
         }
     }
 
@@ -293,8 +305,9 @@ impl HostEndpoint {
         self.answer(now, &flight, Reply::Identity(identity));
     }
 
-    fn handle_stopping(&mut self, now: Instant, seq: u8) {
-        match self.stop.take_if(|flight| flight.seq == seq) {
+    fn handle_stopping(&mut self, now: Instant, session: SessionTag, seq: u8) {
+        let asked_in = self.stop_session;
+        match self.stop.take_if(|flight| (asked_in, flight.seq) == (session, seq)) {
             Some(flight) => self.answer(now, &flight, Reply::Stopping),
             None => self.statistics.stale += 1,
         }

@@ -51,6 +51,12 @@ impl Flight {
         self.due
     }
 
+    /// It goes out again, under another number: an answer to the one before is none any more.
+    pub(super) fn renumber(&mut self, seq: u8) {
+        self.seq = seq;
+        self.due = true;
+    }
+
     /// It goes out now, with so many bytes.
     pub(super) fn sent(&mut self, now: Instant, wire_bytes: usize) {
         self.due = false;
@@ -105,6 +111,11 @@ impl Window {
 
     pub(super) fn oldest(&self) -> Option<&Flight> {
         self.flights.front()
+    }
+
+    /// The number of the request that is taken in next.
+    pub(super) fn next_seq(&self) -> u8 {
+        self.next_seq
     }
 
     /// Takes a request in; there must be room.

@@ -6,8 +6,8 @@ use std::time::Duration;
 use crate::golden;
 use crate::pair::{self, Dice, Faults, Ledger, Pair};
 use firmware_protocol::{
-    CommandId, Decoder, Event, HostEvent, Instant, LinkCause, MoveTo, Nonsense, Reply, Request,
-    RequestType, Said, SessionTag, SubmitError, Ticket, ToDevice, ToHost, frame,
+    Cause, CommandId, Decoder, Event, HostEvent, Instant, LinkCause, MoveTo, Nonsense, Rejection,
+    Reply, Request, RequestType, Said, SessionTag, SubmitError, Ticket, ToDevice, ToHost, frame,
 };
 
 const BOOT: u32 = golden::BOOT;
@@ -294,6 +294,84 @@ fn stop_goes_first_past_a_full_window_and_needs_no_session() {
     let stop = pair.host.submit(pair.now, Request::Stop).unwrap();
     assert_eq!(replied(pair.next_event()), stop);
     assert_eq!(pair.device.executed, [Request::Stop]);
+}
+
+#[test]
+fn a_stop_behind_new_requests_is_executed_after_them() {
+    let mut pair = open(1, Faults::default());
+    let stop = pair.host.submit(pair.now, Request::Stop).unwrap();
+    pair.send();
+    pair.host.submit(pair.now, Request::ClearFault).unwrap();
+    pair.host.submit(pair.now, move_to(1)).unwrap();
+    pair.send();
+    // The answer to the first is still on its way.
+    assert_eq!(pair.host.submit(pair.now, Request::Stop), Ok(stop));
+    while pair.step() {}
+    assert_eq!(pair.device.executed.last(), Some(&Request::Stop));
+    let mut stopped = 0;
+    while let Some(event) = pair.host.poll_event() {
+        stopped += u32::from(matches!(event, HostEvent::Reply { reply: Reply::Stopping, .. }));
+    }
+    assert_eq!((stopped, pair.host.poll_timeout()), (1, None));
+}
+
+#[test]
+fn a_stop_answered_in_a_new_session_is_not_sent_again() {
+    let mut pair = open(1, Faults::default());
+    let stop = pair.host.submit(pair.now, Request::Stop).unwrap();
+    pair.send();
+    let identify = pair.host.identify(pair.now);
+    assert_eq!(replied(pair.next_event()), stop);
+    assert_eq!(replied(pair.next_event()), identify);
+    pair.host.submit(pair.now, move_to(1)).unwrap();
+    while pair.step() {}
+    assert_eq!(pair.device.count(&Request::Stop), 1);
+}
+
+#[test]
+fn a_stop_is_not_undone_by_a_clear_fault_from_before_it() {
+    // Lost and sent again, or never sent yet: either way it comes after the stop.
+    for lose_next in [1, 0] {
+        let mut pair = open(1, Faults::default());
+        pair.down.faults.lose_next = lose_next;
+        pair.host.submit(pair.now, Request::ClearFault).unwrap();
+        if lose_next > 0 {
+            pair.send();
+        }
+        pair.host.submit(pair.now, move_to(1)).unwrap();
+        pair.host.submit(pair.now, Request::Stop).unwrap();
+        while pair.step() {}
+        assert_eq!(pair.device.count(&Request::Stop), 1);
+        assert_eq!(pair.device.count(&Request::ClearFault), 0);
+        let refused = Rejection::Faulted(Cause::Stopped);
+        pair.wait_for(|event| {
+            matches!(event, HostEvent::Reply { request: RequestType::ClearFault,
+                reply: Reply::Rejected(_, why), .. } if *why == refused)
+        });
+        // One from behind it counts, and so it does when the numbers have wrapped.
+        for _ in 0..300 {
+            pair.host.submit(pair.now, Request::ClearFault).unwrap();
+            pair.wait_for(|event| matches!(event, HostEvent::Reply { reply: Reply::Cleared, .. }));
+        }
+    }
+}
+
+#[test]
+fn stops_and_sessions_that_nobody_polls_stay_few_and_none_is_lost() {
+    let mut pair = open(1, Faults::default());
+    let link = &mut pair.device.link;
+    let mut last = 0;
+    for session in 0x100..0x120 {
+        for request in [Request::Identify(session), Request::Stop] {
+            let mut wire = [0; frame::WIRE_MAX];
+            let down = ToDevice { session: SessionTag::of(session), seq: 0, request };
+            let length = down.encode(&mut wire).unwrap();
+            link.handle_bytes(pair.now, &wire[..length]);
+        }
+        last = session;
+    }
+    let polled: Vec<_> = std::iter::from_fn(|| link.poll_event()).map(|one| one.request).collect();
+    assert_eq!(polled, [Request::Stop, Request::Identify(last), Request::Stop]);
 }
 
 #[test]

@@ -262,10 +262,8 @@ impl<P: Peer> Pair<P> {
     /// Sends what is to be sent, and goes to the next moment at which anything happens; `false`
     /// if nothing will.
     pub(crate) fn step(&mut self) -> bool {
+        self.send();
         let mut out = [0; frame::WIRE_MAX];
-        while let Some(length) = self.host.poll_transmit(self.now, &mut out) {
-            self.down.send(self.now, &out[..length]);
-        }
         while let Some(length) = self.device.poll_transmit(self.now, &mut out) {
             self.up.send(self.now, &out[..length]);
         }
@@ -286,6 +284,14 @@ impl<P: Peer> Pair<P> {
             self.host.handle_timeout(self.now);
         }
         true
+    }
+
+    /// The host sends what it has.
+    pub(crate) fn send(&mut self) {
+        let mut out = [0; frame::WIRE_MAX];
+        while let Some(length) = self.host.poll_transmit(self.now, &mut out) {
+            self.down.send(self.now, &out[..length]);
+        }
     }
 
     /// Steps until the host has something to tell, for a simulated minute at most.
