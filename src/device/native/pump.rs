@@ -144,6 +144,8 @@ impl Pump {
                 self.host.identify(now);
             }
             Order::Send(Request::Stop) => {
+                // It goes before what waits here, and must not be undone by it.
+                self.waiting.retain(|request| *request != Request::ClearFault);
                 let _ = self.host.submit(now, Request::Stop);
             }
             Order::Send(request) => {

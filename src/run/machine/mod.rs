@@ -299,7 +299,9 @@ impl Machine {
             Input::Connected(connected) => self.on_connected(connected),
             Input::Accepted(_) => {}
             Input::Rejected(id, rejection) => self.on_rejected(id, rejection),
-            Input::Cleared => self.latch = Latch::Open,
+            // A stop since then has latched it again.
+            Input::Cleared if self.latch == Latch::Clearing => self.latch = Latch::Open,
+            Input::Cleared => {}
             Input::ClearRefused(rejection) => self.on_clear_refused(rejection),
             Input::Stopping => self.stop_confirmed = true,
             Input::Event(event) => self.on_event(now, event),
@@ -345,6 +347,9 @@ impl Machine {
     }
 
     fn on_clear_refused(&mut self, rejection: Rejection) {
+        if self.latch != Latch::Clearing {
+            return;
+        }
         self.latch = Latch::Closed;
         self.next = None;
         self.stand_still(match rejection {
