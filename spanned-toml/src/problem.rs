@@ -112,3 +112,113 @@ impl fmt::Display for Problem {
 }
 
 impl std::error::Error for Problem {}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Bounds, Document, Source};
+
+    /// What a reader makes of the text: asks for a few keys, refuses the rest.
+    fn complaint(text: &str) -> Option<String> {
+        let read = || {
+            let document = Document::parse(Source::new("file.toml", text))?;
+            let root = document.root();
+            root.number("a", Bounds::between(0.0, 1.0))?;
+            root.text("b")?;
+            root.numbers("c", Bounds::between(0.0, 1.0), 1..=2)?;
+            if let Some(table) = root.table("t")? {
+                table.required_text("x")?;
+                table.finish()?;
+            }
+            for table in root.tables("l")? {
+                table.required_number("x", Bounds::between(0.0, 1.0))?;
+                table.finish()?;
+            }
+            root.finish()
+        };
+        read().err().map(|problem| {
+            let place = problem.line_and_column().map_or(String::new(), |at| format!("{at:?}"));
+            format!("{place} {problem}")
+        })
+    }
+
+    #[test]
+    fn whatever_is_wrong_can_be_shown() {
+        let long = "x".repeat(20_000);
+        let texts = [
+            String::new(),
+            "\n".into(),
+            "\u{feff}".into(),
+            "\u{feff}a = 2\n".into(),
+            "\u{feff}[t".into(),
+            "a = 2".into(),
+            "a = 2\r\nb = 1\r\n".into(),
+            "\r\n\r\na = \"\u{1f4a1}\" # \u{1f4a1}\r\n".into(),
+            "a\r= 2".into(),
+            "a = 1\n\r".into(),
+            "b = \"\"\"\n\n\"\"\"\n".into(),
+            "c = [\n  0.5,\n  2,\n]\n".into(),
+            "c = [\n\n0,\n1,\n2\n]".into(),
+            "\"a.b\" = 1".into(),
+            "'\"' = 1".into(),
+            "\"\" = 1".into(),
+            "\"\\n\" = 1\n".into(),
+            "\"\\u0000\\u001b[31m\" = 1\n".into(),
+            "a.b.c = 1".into(),
+            "t.\"x y\" = 1".into(),
+            "[t]\n[t]".into(),
+            "[t]".into(),
+            "[t]\n".into(),
+            "[[l]]\n[[l]]\nx = 0\n".into(),
+            "l = [{x = 0}, {}]".into(),
+            "t = {".into(),
+            "a = \"\\uD800\"".into(),
+            "a = 99999999999999999999999999".into(),
+            "a = 1e999999999999".into(),
+            "a = 0x".into(),
+            "a = nan".into(),
+            "a = 2020-13-45".into(),
+            format!("a = {}", "9".repeat(20_000)),
+            format!("b = 1 # {long}"),
+            format!("{long} = 1"),
+            format!("a = \"{long}\""),
+            format!("a = \"{}\"\n", "\u{1f4a1}".repeat(5_000)),
+            format!("a = {}1{}", "[".repeat(100_000), "]".repeat(100_000)),
+            format!("a = {}", "{a=".repeat(100_000)),
+            format!("a{} = 1", ".a".repeat(100_000)),
+            format!("[a{}]", ".a".repeat(100_000)),
+            "\u{202e}\u{301} = 1".into(),
+            "\t\ta = 2".into(),
+            "a = 2 \u{0}".into(),
+            "a = 1\u{2028}b = 2".into(),
+        ];
+        for text in texts {
+            let Some(shown) = complaint(&text) else { continue };
+            assert!(!shown.contains('\u{1b}') && !shown.contains('\0'), "{shown}");
+            let title = shown.lines().next().unwrap_or_default();
+            assert!(title.chars().count() < 120, "{title}");
+        }
+    }
+
+    #[test]
+    fn keys_are_named_as_they_stand_in_the_file() {
+        for (text, title) in [
+            ("\"a.b\" = 1", "(1, 1) error: \"a.b\": unknown key"),
+            ("t = { x = '1', \"\" = 1 }", "(1, 16) error: t.\"\": unknown key"),
+            ("\"\\n\" = 1", "(1, 1) error: \"\\n\": unknown key"),
+            ("\u{feff}a = 2\r\n", "(1, 5) error: a: found the integer 2"),
+        ] {
+            let shown = complaint(text).unwrap();
+            assert_eq!(shown.lines().next(), Some(title), "{shown}");
+        }
+    }
+
+    #[test]
+    fn of_a_file_that_is_nearly_empty_nothing_is_wrong_but_what_is_missing() {
+        for text in ["", "\n", "\r\n", "\u{feff}", "# nothing"] {
+            assert_eq!(complaint(text), None);
+            let document = Document::parse(Source::new("file.toml", text)).unwrap();
+            let problem = document.root().required_table("t").unwrap_err();
+            assert!(problem.to_string().contains("t: missing key"), "{problem}");
+        }
+    }
+}

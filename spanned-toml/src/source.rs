@@ -14,6 +14,9 @@ use crate::{Problem, Table};
 /// recording, or the wrong file.
 const SOURCE_BYTES_MAX: u64 = 1 << 20;
 
+/// What some editors put before the text. Nobody sees it, so that it counts as no column.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// A file's text and the name to call it by in messages. Cheap to clone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
@@ -22,8 +25,9 @@ pub struct Source {
 }
 
 impl Source {
-    /// Text that is already in memory.
+    /// Text that is already in memory. A byte order mark before it is no part of it.
     pub fn new(name: &str, text: &str) -> Self {
+        let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
         Self { name: name.into(), text: text.into() }
     }
 
@@ -61,11 +65,12 @@ impl Source {
             let help = "is this the right file?";
             return Err(problem(format!("is not text: byte {byte} is 0"), "a TOML file", help));
         }
-        if text.trim().is_empty() {
+        let source = Self::new(&name, &text);
+        if source.text.trim().is_empty() {
             let help = "is this the right file, and was it saved?";
             return Err(problem("is empty".into(), "a TOML file", help));
         }
-        Ok(Self::new(&name, &text))
+        Ok(source)
     }
 
     /// What messages call the file.
@@ -73,7 +78,7 @@ impl Source {
         &self.name
     }
 
-    /// The whole text, as read.
+    /// The whole text.
     pub fn text(&self) -> &str {
         &self.text
     }

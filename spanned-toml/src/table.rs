@@ -13,6 +13,8 @@ const WORD_LETTERS_PER_EDIT: usize = 3;
 /// Words that keys end with to say a number's unit: one for another is a slip of its own.
 const UNITS: [&str; 14] =
     ["a", "cm", "deg", "h", "hz", "khz", "m", "min", "mm", "ms", "rad", "s", "um", "us"];
+/// Characters of a file's key or value that a message repeats; no word that is known is longer.
+const SHOWN_MAX: usize = 60;
 const TABLE: &str = "a table";
 
 /// A table being read. Ask for each key that may stand in it, then call [`Table::finish`].
@@ -198,7 +200,7 @@ impl<'d> Table<'d> {
         } else {
             format!("one of: {}", asked.join(", "))
         };
-        let key = self.dotted(&unknown.key);
+        let key = self.dotted(&shown(&unknown.key));
         Err(Problem::at(self.source, unknown.key_span.clone(), &key, "unknown key", &known, &help))
     }
 
@@ -242,7 +244,7 @@ impl<'d> Table<'d> {
     fn missing(&self, key: &str, expected: &str) -> Problem {
         if let Some(entry) = self.misspelt(key) {
             let expected = format!("`{key}`, {expected}");
-            let (found, span) = (self.dotted(&entry.key), entry.key_span.clone());
+            let (found, span) = (self.dotted(&shown(&entry.key)), entry.key_span.clone());
             let help = format!("did you mean `{key}`?");
             return Problem::at(self.source, span, &found, "unknown key", &expected, &help);
         }
@@ -288,7 +290,7 @@ impl<'d> Table<'d> {
     fn unexpected_with(&self, key: &str, value: &Value, expected: &str, help: &str) -> Problem {
         let span = value.span.clone();
         let found = self.source.text().get(span.clone()).unwrap_or_default();
-        let found: String = found.lines().next().unwrap_or_default().chars().take(60).collect();
+        let found = shortened(found.lines().next().unwrap_or_default());
         let what = format!("found {} {found}", value.kind.name());
         Problem::at(self.source, span, &self.dotted(key), &what, expected, help)
     }
@@ -303,7 +305,21 @@ fn one_of<T>(choices: &[(&str, T)]) -> String {
     format!("one of {}", words.join(", "))
 }
 
+/// A key from a file as it would stand there, on one line: in quotes unless it is a bare one.
+fn shown(key: &str) -> String {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let key = shortened(key);
+    if !key.is_empty() && key.chars().all(is_bare) { key } else { format!("{key:?}") }
+}
+
+fn shortened(text: &str) -> String {
+    text.chars().take(SHOWN_MAX).collect()
+}
+
 fn nearest<'a>(word: &str, known: &'a [String]) -> Option<&'a String> {
+    if word.len() > SHOWN_MAX {
+        return None;
+    }
     known
         .iter()
         .map(|candidate| (edits(word, candidate), candidate))
