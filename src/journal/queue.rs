@@ -221,6 +221,13 @@ impl Queue {
         Ok(sequence)
     }
 
+    /// The number of the latest event; 0 if nothing ever happened.
+    pub fn latest_event(&self) -> Result<i64, JournalError> {
+        self.connection
+            .query_row("SELECT coalesce(max(sequence), 0) FROM events", [], |row| row.get(0))
+            .map_err(|error| JournalError::sqlite(&self.path, "read events", &error))
+    }
+
     /// Events after a sequence number, oldest first, at most `limit`.
     pub fn events_after(&self, after: i64, limit: u32) -> Result<Vec<(i64, String)>, JournalError> {
         let fail = |error| JournalError::sqlite(&self.path, "read events", &error);

@@ -5,7 +5,7 @@ use tokio::sync::{oneshot, watch};
 use super::events::{Events, Happening, Progress};
 use super::hand::{HandError, Stand, TakeOne};
 use super::job::{Ended, Job};
-use super::machine::{Answer, Wish};
+use super::machine::{Answer, Source, Wish};
 use super::state::{Doubt, Fault, Position, State};
 use crate::journal::Writer;
 use crate::rig::{Latched, Reading};
@@ -60,6 +60,8 @@ pub struct OwnerStatus {
     pub position: Position,
     /// What the rig stands still for.
     pub fault: Option<Fault>,
+    /// What a person is asked to switch, before saying continue.
+    pub asked: Option<Source>,
     /// How far the run is.
     pub progress: Progress,
 }
@@ -79,6 +81,7 @@ impl Desk {
             state: State::Idle,
             position: Position::Untrusted(Doubt::NotHomed),
             fault: None,
+            asked: None,
             progress: Progress::default(),
         };
         Self { events: Events::default(), status: watch::Sender::new(status), is_closing: false }
@@ -90,6 +93,7 @@ impl Desk {
                 is_running: true,
                 state: State::Idle,
                 fault: None,
+                asked: None,
                 progress,
                 ..status.clone()
             };
@@ -111,12 +115,11 @@ impl Desk {
                 status.state = *state;
                 if state.is_active() {
                     status.fault = None;
+                    status.asked = None;
                 }
             }
-            Happening::AskSource(_)
-            | Happening::Link(_)
-            | Happening::Reading(_)
-            | Happening::ReferenceCheck(_) => {}
+            Happening::AskSource(source) => status.asked = Some(*source),
+            Happening::Link(_) | Happening::Reading(_) | Happening::ReferenceCheck(_) => {}
         });
         self.events.tell(happening);
     }
