@@ -11,7 +11,7 @@ use tokio::sync::mpsc;
 use super::failure::Failure;
 use super::progress::ProgressLine;
 use super::session::draw_session;
-use super::setup::Setup;
+use super::setup::{Setup, Stage};
 use super::simulated::{SimulatedDevice, StopSignals};
 use crate::device::{Opener, SerialSettings, serial_opener};
 use crate::journal::{Journal, JournalError, Writer};
@@ -68,9 +68,10 @@ impl Pace {
     }
 }
 
-/// The way to the setup's rig. Must be called on the runtime that the rig is to be driven on.
-pub(crate) fn opener_of(setup: &Setup) -> Opener {
-    match (&setup.stage, &setup.rig.link) {
+/// The way to a rig; a simulated one is switched on here. Must be called on the runtime that the
+/// rig is to be driven on.
+pub(crate) fn opener_of(stage: Option<&Stage>, link: &Link) -> Opener {
+    match (stage, link) {
         (Some(stage), link) => SimulatedDevice::switch_on(stage, link.baud()).opener(),
         (None, Link::Serial { port, baud, reset_on_open, boot_wait }) => {
             serial_opener(SerialSettings {
@@ -92,7 +93,8 @@ pub(crate) fn acquire(
     begin: impl FnOnce() -> Result<(Journal, Job), Failure>,
 ) -> Result<Acquired, Failure> {
     pace.runtime()?.block_on(async {
-        let (owner, task) = own(Arc::new(setup.rig.clone()), opener_of(setup), pace.session());
+        let opener = opener_of(setup.stage.as_ref(), &setup.rig.link);
+        let (owner, task) = own(Arc::new(setup.rig.clone()), opener, pace.session());
         owner.look().await.map_err(Failure::start)?;
         let (journal, job) = begin()?;
         let ended = run_job(setup, &owner, pace, journal, job).await;

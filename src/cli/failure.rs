@@ -31,6 +31,11 @@ impl Failure {
         Self { code: 1, text: why.to_string() }
     }
 
+    /// What a person is told.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Says so on standard error.
     pub(crate) fn report(&self) -> ExitCode {
         let is_marked = self.text.starts_with("error");

@@ -131,6 +131,9 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, String> {
 pub(crate) struct Bundle {
     /// The seed of everything random on a simulated rig.
     pub(crate) seed: u64,
+    /// What the plan is called if it doesn't say: the client knows its folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) name: Option<String>,
     files: Vec<BundledFile>,
 }
 
@@ -148,7 +151,7 @@ struct BundledFile {
 
 impl Bundle {
     /// Packs what was read.
-    pub(crate) fn pack(seed: u64, inputs: &[Input]) -> Self {
+    pub(crate) fn pack(seed: u64, name: Option<String>, inputs: &[Input]) -> Self {
         let pack = |input: &Input| {
             let (role, name) = (input.role.name().to_owned(), input.name.clone());
             match String::from_utf8(input.bytes.clone()) {
@@ -156,7 +159,7 @@ impl Bundle {
                 Err(e) => BundledFile { role, name, text: None, bytes: Some(e.into_bytes()) },
             }
         };
-        Self { seed, files: inputs.iter().map(pack).collect() }
+        Self { seed, name, files: inputs.iter().map(pack).collect() }
     }
 
     /// Unpacks it again; names the first file that makes no sense.
@@ -185,7 +188,7 @@ mod tests {
             Input { role: InputRole::Plan, name: "plan.toml".into(), bytes: b"a = 1\n".to_vec() },
             Input { role: InputRole::Attachment, name: "l.ies".into(), bytes: vec![0xe9, 10, 0] },
         ];
-        let text = serde_json::to_string(&Bundle::pack(7, &inputs)).unwrap();
+        let text = serde_json::to_string(&Bundle::pack(7, None, &inputs)).unwrap();
         let bundle: Bundle = serde_json::from_str(&text).unwrap();
         assert_eq!(bundle.seed, 7);
         assert_eq!(bundle.unpack().unwrap(), inputs);

@@ -3,6 +3,8 @@
 
 mod acquire;
 mod args;
+mod client;
+mod daemon;
 mod explain;
 mod export;
 mod failure;
@@ -15,10 +17,12 @@ mod output;
 mod plan;
 mod ports;
 mod progress;
+mod remote;
 mod results;
 mod run;
 mod session;
 mod setup;
+mod shop;
 mod simulated;
 mod summary;
 mod text;
@@ -41,6 +45,13 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),
         Command::Plan(args) => plan::plan(&args),
+        Command::Daemon(args) => daemon::daemon(&args),
+        Command::Submit(args) => remote::submit(&args),
+        Command::Status(args) => remote::status(&args),
+        Command::Watch(args) => remote::watch(&args),
+        Command::Pause(args) => remote::ask(&args, "pause"),
+        Command::Continue(args) => remote::ask(&args, "continue"),
+        Command::Abort(args) => remote::ask(&args, "abort"),
         _ => Err(Failure::start("not in this build")),
     };
     outcome.unwrap_or_else(|failure| failure.report())

@@ -243,7 +243,7 @@ fn compile(scene: sim::Scene, rig: &Rig, seed: u64) -> Result<Stage, Failure> {
 }
 
 /// A plan without a name is called after its folder.
-fn folder_name(plan: &Path) -> String {
+pub(crate) fn folder_name(plan: &Path) -> String {
     let absolute = std::path::absolute(plan).unwrap_or_else(|_| plan.to_owned());
     let folder = absolute.parent().and_then(Path::file_name);
     folder.map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned())

@@ -1,0 +1,194 @@
+//! What the daemon leaves to the command line: what a client sent becomes a run on the daemon's
+//! own rig, and a run's readings become the files of its folder.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use spanned_toml::{Document, Source};
+
+use super::failure::Failure;
+use super::folder::{JOURNAL, create};
+use super::inputs::Bundle;
+use super::results::{Results, read_run, targets_planned};
+use super::run::first_job;
+use super::session::utc_now;
+use super::setup::{Setup, Stage};
+use super::text::with_uncertainty;
+use crate::daemon::{Checked, Finished, Prepared, Refusal, Workshop};
+use crate::journal::{Input, InputRole, Journal, JournalError, Order, Writer};
+use crate::rig::Rig;
+use crate::run::{Job, OnFault, resume};
+
+/// The daemon's rig, and on a simulated one what stands on it.
+#[derive(Debug)]
+pub(crate) struct Shop {
+    pub(crate) rig: Rig,
+    /// `None` for a real rig.
+    pub(crate) stage: Option<Stage>,
+    /// The rig's file, the scene's, and what that names, byte for byte.
+    pub(crate) inputs: Vec<Input>,
+    pub(crate) seed: u64,
+}
+
+impl Shop {
+    /// The client's plan on our rig, under our scene.
+    fn set_up(&self, bundle: &[u8]) -> Result<(Setup, Vec<String>), Refusal> {
+        let bundle: Bundle = serde_json::from_slice(bundle).map_err(|error| {
+            Refusal::new(format!("not a plan with its files: {error}"))
+                .expecting("{\"files\": [{\"role\": \"plan\", \"name\": ..., \"text\": ...}, ...]}")
+        })?;
+        let name = bundle.name.clone();
+        let sent = bundle.unpack().map_err(Refusal::new)?;
+        let mut notes = Vec::new();
+        for input in &sent {
+            match input.role {
+                InputRole::Rig => notes.extend(self.compare_rig(input)?),
+                InputRole::Scene => self.compare_scene(input)?,
+                InputRole::Attachment => self.compare_attachment(input)?,
+                InputRole::Plan => {}
+            }
+        }
+        let theirs =
+            sent.into_iter().filter(|i| matches!(i.role, InputRole::Plan | InputRole::Attachment));
+        let inputs = self.inputs.iter().cloned().chain(theirs).collect();
+        let setup = Setup::from_inputs(inputs, name, self.seed)
+            .map_err(|failure| Refusal::new(failure.text()))?;
+        Ok((setup, notes))
+    }
+
+    fn ours(&self, role: InputRole) -> Option<&Input> {
+        self.inputs.iter().find(|input| input.role == role)
+    }
+
+    /// Another rig is refused; the same one is run as the daemon's own file has it.
+    fn compare_rig(&self, sent: &Input) -> Result<Option<String>, Refusal> {
+        let text = String::from_utf8_lossy(&sent.bytes);
+        let rig = Document::parse(Source::new(&sent.name, &text))
+            .and_then(Rig::read)
+            .map_err(|problem| Refusal::new(problem.to_string()))?;
+        if rig.name != self.rig.name {
+            return Err(Refusal::new(format!("the plan is for another rig: \"{}\"", rig.name))
+                .expecting(format!("this daemon's, \"{}\"", self.rig.name))
+                .with_help("name this rig in the plan, or submit it to that rig's daemon"));
+        }
+        let is_ours = self.ours(InputRole::Rig).is_some_and(|ours| ours.bytes == sent.bytes);
+        Ok((!is_ours).then(|| format!("{}: the daemon's own rig file is used instead", sent.name)))
+    }
+
+    fn compare_scene(&self, sent: &Input) -> Result<(), Refusal> {
+        match self.ours(InputRole::Scene) {
+            // A real rig measures what stands on it.
+            None => Ok(()),
+            Some(ours) if ours.bytes == sent.bytes => Ok(()),
+            Some(ours) => {
+                Err(Refusal::new(format!("{}: another scene than the daemon's", sent.name))
+                    .expecting(format!("the contents of the daemon's {}", ours.name))
+                    .with_help("start the daemon with this --scene, or leave the plan's out"))
+            }
+        }
+    }
+
+    /// Files go by their names: ours must not be taken for theirs.
+    fn compare_attachment(&self, sent: &Input) -> Result<(), Refusal> {
+        let differs = |ours: &&Input| {
+            ours.role == sent.role && ours.name == sent.name && ours.bytes != sent.bytes
+        };
+        match self.inputs.iter().find(differs) {
+            None => Ok(()),
+            Some(ours) => Err(Refusal::new(format!(
+                "{}: the daemon's scene has a file of this name with other contents",
+                ours.name
+            ))
+            .with_help("rename yours, or start the daemon with this scene")),
+        }
+    }
+}
+
+impl Workshop for Shop {
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn utc_now(&self) -> String {
+        utc_now()
+    }
+
+    fn check(&self, bundle: &[u8]) -> Result<Checked, Refusal> {
+        let (setup, notes) = self.set_up(bundle)?;
+        let prediction = &setup.sequence.prediction;
+        Ok(Checked {
+            name: setup.plan_name.clone(),
+            targets: prediction.targets,
+            readings: prediction.readings,
+            predicted_s: prediction.total_s(),
+            notes,
+        })
+    }
+
+    fn prepare(&self, bundle: &[u8], folder: &Path) -> Result<Prepared, Refusal> {
+        let refuse = |failure: Failure| Refusal::new(failure.text());
+        let (journal, job) = match Journal::open(&folder.join(JOURNAL)) {
+            Err(JournalError::Missing { .. } | JournalError::Empty { .. }) => {
+                let (setup, _) = self.set_up(bundle)?;
+                // A daemon that was killed while it made the folder had measured nothing.
+                let _ = std::fs::remove_dir_all(folder);
+                let (journal, _) = create(folder, &setup).map_err(refuse)?;
+                (journal, first_job(&setup, OnFault::Wait))
+            }
+            Err(error) => return Err(Refusal::new(error.to_string())),
+            Ok(journal) => match carry_on(&journal).map_err(refuse)? {
+                None => return Ok(Prepared::Measured),
+                Some(job) => (journal, job),
+            },
+        };
+        let journal = Writer::threaded(journal).map_err(|error| Refusal::new(error.to_string()))?;
+        Ok(Prepared::ToMeasure { job: Box::new(job), journal: Box::new(journal) })
+    }
+
+    fn finish(&self, folder: &Path) -> Result<Finished, Refusal> {
+        self.evaluate(folder).map_err(|failure| Refusal::new(failure.text()))
+    }
+}
+
+/// What is left of the run in a journal, made of the files that are in it, after the reference
+/// pose was measured again; `None` if every step has its reading.
+fn carry_on(journal: &Journal) -> Result<Option<Job>, Failure> {
+    let reader = journal.reader();
+    let header = reader.header()?;
+    let setup = Setup::from_inputs(reader.inputs()?, Some(header.plan_name), header.seed)?;
+    let (readings, sessions) = (reader.readings(Order::Taken)?, reader.sessions()?);
+    let left = resume::remainder(&setup.sequence.steps, &readings, &sessions);
+    if left.steps.is_empty() {
+        return Ok(None);
+    }
+    let mut job = first_job(&setup, OnFault::Wait);
+    job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
+    let rig = Arc::new(setup.rig.clone());
+    job.check = Some(resume::check(rig, &setup.sequence, &left, readings, false));
+    job.steps.clone_from(&left.steps);
+    job.done_before = left.done;
+    job.session = left.session;
+    job.session_began_s = left.began_s;
+    Ok(Some(job))
+}
+
+impl Shop {
+    fn evaluate(&self, folder: &Path) -> Result<Finished, Failure> {
+        let (setup, header, readings) = read_run(folder)?;
+        let results = Results::of(&setup, setup.plan.fit, &readings)?;
+        results.write(folder, &setup, &header, &readings)?;
+        let (measured, planned) = (results.calibrated.samples.len(), targets_planned(&setup));
+        let fit = match &results.fitted {
+            Ok(fitted) => {
+                let exitance = fitted.fit.exitance();
+                let [_, unit, _] = self.rig.detector.quantity.units();
+                format!("exitance {}", with_uncertainty(exitance.value, exitance.u, unit))
+            }
+            Err(error) => format!("no fit: {error}"),
+        };
+        Ok(Finished {
+            is_complete: measured == planned,
+            summary: format!("{measured} of {planned} targets measured; {fit}"),
+        })
+    }
+}
