@@ -19,6 +19,7 @@ mod ports;
 mod progress;
 mod remote;
 mod results;
+mod resume;
 mod run;
 mod session;
 mod setup;
@@ -44,6 +45,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::export(&args),
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),
+        Command::Resume(args) => resume::resume(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Daemon(args) => daemon::daemon(&args),
         Command::Submit(args) => remote::submit(&args),
