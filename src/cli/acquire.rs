@@ -45,7 +45,8 @@ impl Pace {
         if setup.stage.is_some() && !is_realtime { Self::Virtual } else { Self::Real }
     }
 
-    fn runtime(self) -> Result<tokio::runtime::Runtime, Failure> {
+    /// A runtime of one thread, its clock paused for virtual time.
+    pub(crate) fn runtime(self) -> Result<tokio::runtime::Runtime, Failure> {
         tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .start_paused(self == Self::Virtual)
@@ -60,7 +61,8 @@ impl Pace {
         }
     }
 
-    fn session(self) -> u32 {
+    /// The first session's number.
+    pub(crate) fn session(self) -> u32 {
         match self {
             Self::Virtual => OWN_SESSION,
             Self::Real => draw_session(),

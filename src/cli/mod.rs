@@ -11,6 +11,7 @@ mod failure;
 mod fit;
 mod folder;
 mod frontier;
+mod hand;
 mod inputs;
 mod nominal;
 mod output;
@@ -33,7 +34,6 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 use args::{Cli, Command};
-use failure::Failure;
 
 /// Parses the process's arguments and does what they ask.
 pub fn main() -> ExitCode {
@@ -46,6 +46,9 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),
         Command::Resume(args) => resume::resume(&args),
+        Command::Home(args) => hand::home(&args),
+        Command::Jog(args) => hand::jog(&args),
+        Command::Read(args) => hand::read(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Daemon(args) => daemon::daemon(&args),
         Command::Submit(args) => remote::submit(&args),
@@ -54,7 +57,6 @@ pub fn main() -> ExitCode {
         Command::Pause(args) => remote::ask(&args, "pause"),
         Command::Continue(args) => remote::ask(&args, "continue"),
         Command::Abort(args) => remote::ask(&args, "abort"),
-        _ => Err(Failure::start("not in this build")),
     };
     outcome.unwrap_or_else(|failure| failure.report())
 }

@@ -111,6 +111,10 @@ impl Hand<'_> {
                 break;
             }
         }
+        if moved.is_ok() {
+            self.desk.tell(Happening::State(State::Settling));
+            tokio::time::sleep(way.settle).await;
+        }
         self.desk.tell(Happening::State(State::Idle));
         moved?;
         self.look().await
