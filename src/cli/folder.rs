@@ -40,20 +40,26 @@ pub(crate) fn header(setup: &Setup) -> Header {
 pub(crate) fn create(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {
     let shown = folder.display();
     if let Some(parent) = folder.parent() {
-        std::fs::create_dir_all(parent)
-            .map_err(|error| Failure::start(format!("{}: {error}", parent.display())))?;
+        std::fs::create_dir_all(parent).map_err(|error| no_folder(parent, &error))?;
     }
     std::fs::create_dir(folder).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => Failure::with_help(
             format!("{shown}: exists already; a run is never overwritten"),
             "choose another folder with --out, or carry the run on with `gonio resume`",
         ),
-        _ => Failure::start(format!("{shown}: {error}")),
+        _ => no_folder(folder, &error),
     })?;
     fill(folder, setup).inspect_err(|_| {
         // Made a moment ago, by us; what is in it is of no use.
         let _ = std::fs::remove_dir_all(folder);
     })
+}
+
+fn no_folder(folder: &Path, error: &std::io::Error) -> Failure {
+    Failure::with_help(
+        format!("{}: the folder cannot be made: {error}", folder.display()),
+        "choose another one with --out",
+    )
 }
 
 fn fill(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {

@@ -14,6 +14,7 @@ use super::acquire::{Acquired, Pace, acquire};
 use super::args::FrontierArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::create;
+use super::output::{say, write_out};
 use super::results::Results;
 use super::run::first_job;
 use super::session::utc_stamp;
@@ -66,10 +67,9 @@ pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
         })
         .map_err(Failure::midway)?;
     if args.json {
-        print_json(&rows);
+        write_out(|out| rows.iter().try_for_each(|row| writeln!(out, "{}", as_json(row))))?;
     } else {
-        print!("{}", as_text(&rows, &points));
-        println!("  folder {}", folder.display());
+        say(&format!("{}  folder {}\n", as_text(&rows, &points), folder.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -185,20 +185,15 @@ fn as_text(rows: &[FrontierRow], points: &[FrontierPoint]) -> String {
     text
 }
 
-fn print_json(rows: &[FrontierRow]) {
-    for row in rows {
-        println!(
-            "{}",
-            json!({
-                "scene": row.scene, "strategy": row.strategy, "parameters": row.parameters,
-                "seed": row.seed, "rig_s": row.rig_s, "readings": row.readings,
-                "error_radiance_rms_relative": row.error_radiance_rms_relative,
-                "error_exitance_relative": row.error_exitance_relative,
-                "error_flux_relative": row.error_flux_relative,
-                "u_exitance_relative": row.u_exitance_relative,
-                "compute_s": row.compute_s,
-                "error_shape_rms_relative": row.error_shape_rms_relative,
-            })
-        );
-    }
+fn as_json(row: &FrontierRow) -> serde_json::Value {
+    json!({
+        "scene": row.scene, "strategy": row.strategy, "parameters": row.parameters,
+        "seed": row.seed, "rig_s": row.rig_s, "readings": row.readings,
+        "error_radiance_rms_relative": row.error_radiance_rms_relative,
+        "error_exitance_relative": row.error_exitance_relative,
+        "error_flux_relative": row.error_flux_relative,
+        "u_exitance_relative": row.u_exitance_relative,
+        "compute_s": row.compute_s,
+        "error_shape_rms_relative": row.error_shape_rms_relative,
+    })
 }

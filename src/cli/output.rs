@@ -1,5 +1,5 @@
 //! Standard output: what a command answers. A reader that has read enough (`| head`) is no error;
-//! a full disk is one, and is named.
+//! a full disk is one, and is named. And standard error: what a person may want to know meanwhile.
 
 use std::io::{self, BufWriter, ErrorKind, Write};
 
@@ -13,6 +13,11 @@ pub(crate) fn say(text: &str) -> Result<(), Failure> {
 /// Writes one JSON document and ends its line.
 pub(crate) fn say_json(document: &serde_json::Value) -> Result<(), Failure> {
     write_out(|out| writeln!(out, "{document}"))
+}
+
+/// Tells a person something beside the answer. Where nobody listens it is not said.
+pub(crate) fn note(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }
 
 /// Hands standard output, buffered, to a writer of something long.

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::args::PortsArgs;
 use super::failure::{Failure, Outcome};
-use super::output::{say, say_json};
+use super::output::{note, say, say_json};
 use super::session::draw_session;
 use super::text::table;
 use crate::device::{Native, SerialSettings, list_ports, open_serial};
@@ -38,7 +38,7 @@ pub(crate) fn ports(args: &PortsArgs) -> Outcome {
 }
 
 fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
-    eprintln!("opening {port} at {baud} baud and asking who is there; nothing will move");
+    note(&format!("opening {port} at {baud} baud and asking who is there; nothing will move"));
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()

@@ -5,6 +5,7 @@ use std::io::IsTerminal as _;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::acquire::Pace;
+use super::output::note;
 use super::setup::Setup;
 use super::text::duration;
 use crate::rig::{Detector, Reading, ReadingKind, Rig};
@@ -39,7 +40,7 @@ impl ProgressLine {
 
     /// A line of its own, above the bar, that stays.
     pub(crate) fn say(&self, text: &str) {
-        if self.bar.is_hidden() { eprintln!("{text}") } else { self.bar.println(text) }
+        if self.bar.is_hidden() { note(text) } else { self.bar.println(text) }
     }
 
     /// Shows what happened.

@@ -7,6 +7,7 @@ use super::acquire::{Acquired, Pace, acquire, exit_code};
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{create, default_folder};
+use super::output::{say, say_json};
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::summary::Summary;
@@ -73,7 +74,7 @@ pub(crate) fn finish(
         results => results?,
     };
     results.write(folder, setup, &journal.reader().header()?, &readings)?;
-    journal.close().map_err(Failure::midway)?;
+    let closed = journal.close();
     let summary = Summary {
         folder,
         setup,
@@ -83,10 +84,11 @@ pub(crate) fn finish(
         wall_s: began.elapsed().as_secs_f64(),
     };
     if ending.is_json {
-        println!("{}", summary.json());
+        say_json(&summary.json())?;
     } else {
-        print!("{}", summary.text());
+        say(&summary.text())?;
     }
+    closed.map_err(Failure::midway)?;
     if !is_complete {
         return Err(interrupted(folder, &outcome));
     }

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use super::args::SimArgs;
 use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs};
-use super::output::say;
+use super::output::{note, say};
 use super::setup::{Stage, rig_at, stage_at};
 use crate::device::{Link, Opener, opener};
 
@@ -92,7 +92,7 @@ async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
     let pty = sim::Pty::open(args.pty.as_deref()).map_err(cannot)?;
     let shown = args.pty.as_deref().unwrap_or(pty.path());
     say(&format!("{}\n", shown.display()))?;
-    eprintln!("simulated rig at {baud} baud; Ctrl-C switches it off");
+    note(&format!("simulated rig at {baud} baud; Ctrl-C switches it off"));
     let mut device = device(stage);
     tokio::select! {
         biased;

@@ -42,11 +42,24 @@ pub fn write_atomically(
         // It may not be there, and it is of no use.
         let _ = std::fs::remove_file(&partial);
         let path = path.to_owned();
-        match source.kind() {
-            ErrorKind::StorageFull => ExportError::DiskFull { path },
-            _ => ExportError::Write { path, source },
+        if is_disk_full(&source) {
+            ExportError::DiskFull { path }
+        } else {
+            ExportError::Write { path, source }
         }
     })
+}
+
+/// Whether the disk, or what the user may take of it, is at its end. The writer of CSV wraps the
+/// system's error in its own.
+fn is_disk_full(error: &io::Error) -> bool {
+    if let Some(wrapped) = error.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>()) {
+        return matches!(wrapped.kind(), csv::ErrorKind::Io(error) if is_disk_full(error));
+    }
+    matches!(
+        error.kind(),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge
+    )
 }
 
 fn write_and_rename(
@@ -104,7 +117,7 @@ mod tests {
         let path = folder.path().join("samples.csv");
         let full = |out: &mut dyn Write| {
             out.write_all(b"half of it")?;
-            Err(io::Error::from(ErrorKind::StorageFull))
+            Err(csv::Error::from(io::Error::from(ErrorKind::StorageFull)).into())
         };
         let error = write_atomically(&path, full).unwrap_err();
         assert!(error.to_string().ends_with("disk full; nothing of it was kept"), "{error}");

@@ -123,6 +123,10 @@ impl JournalError {
                 ErrorCode::DiskFull => Self::DiskFull { path, detail },
                 ErrorCode::DatabaseCorrupt => Self::Corrupt { path, detail },
                 ErrorCode::NotADatabase => Self::NotAJournal { path, found: detail },
+                ErrorCode::SystemIoFailure => {
+                    let detail = format!("{detail}; a full disk, a limit, or a medium that went?");
+                    Self::Storage { path, doing, detail }
+                }
                 _ => Self::Storage { path, doing, detail },
             },
             // A row that does not hold what this program writes.
