@@ -130,6 +130,7 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, String> {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Bundle {
     /// The seed of everything random on a simulated rig.
+    #[serde(default)]
     pub(crate) seed: u64,
     /// What the plan is called if it doesn't say: the client knows its folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]

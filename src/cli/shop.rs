@@ -2,7 +2,6 @@
 //! own rig, and a run's readings become the files of its folder.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use spanned_toml::{Document, Source};
 
@@ -10,14 +9,15 @@ use super::failure::Failure;
 use super::folder::{JOURNAL, create};
 use super::inputs::Bundle;
 use super::results::{Results, read_run, targets_planned};
+use super::resume::{self, what_is_left};
 use super::run::first_job;
 use super::session::utc_now;
 use super::setup::{Setup, Stage};
 use super::text::with_uncertainty;
 use crate::daemon::{Checked, Finished, Prepared, Refusal, Workshop};
-use crate::journal::{Input, InputRole, Journal, JournalError, Order, Writer};
+use crate::journal::{Input, InputRole, Journal, JournalError, Writer};
 use crate::rig::Rig;
-use crate::run::{Job, OnFault, resume};
+use crate::run::OnFault;
 
 /// The daemon's rig, and on a simulated one what stands on it.
 #[derive(Debug)]
@@ -127,7 +127,8 @@ impl Workshop for Shop {
 
     fn prepare(&self, bundle: &[u8], folder: &Path) -> Result<Prepared, Refusal> {
         let refuse = |failure: Failure| Refusal::new(failure.text());
-        let (journal, job) = match Journal::open(&folder.join(JOURNAL)) {
+        let path = folder.join(JOURNAL);
+        let (journal, job) = match Journal::open(&path) {
             Err(JournalError::Missing { .. } | JournalError::Empty { .. }) => {
                 let (setup, _) = self.set_up(bundle)?;
                 // A daemon that was killed while it made the folder had measured nothing.
@@ -136,10 +137,16 @@ impl Workshop for Shop {
                 (journal, first_job(&setup, OnFault::Wait))
             }
             Err(error) => return Err(Refusal::new(error.to_string())),
-            Ok(journal) => match carry_on(&journal).map_err(refuse)? {
-                None => return Ok(Prepared::Measured),
-                Some(job) => (journal, job),
-            },
+            Ok(journal) => {
+                let (setup, left) = what_is_left(&path).map_err(refuse)?;
+                // A reference that has moved is a fault; to say continue once more accepts it.
+                let job =
+                    resume::job(&setup, &path, &left, false, OnFault::Wait).map_err(refuse)?;
+                match job {
+                    None => return Ok(Prepared::Measured),
+                    Some(job) => (journal, job),
+                }
+            }
         };
         let journal = Writer::threaded(journal).map_err(|error| Refusal::new(error.to_string()))?;
         Ok(Prepared::ToMeasure { job: Box::new(job), journal: Box::new(journal) })
@@ -148,28 +155,6 @@ impl Workshop for Shop {
     fn finish(&self, folder: &Path) -> Result<Finished, Refusal> {
         self.evaluate(folder).map_err(|failure| Refusal::new(failure.text()))
     }
-}
-
-/// What is left of the run in a journal, made of the files that are in it, after the reference
-/// pose was measured again; `None` if every step has its reading.
-fn carry_on(journal: &Journal) -> Result<Option<Job>, Failure> {
-    let reader = journal.reader();
-    let header = reader.header()?;
-    let setup = Setup::from_inputs(reader.inputs()?, Some(header.plan_name), header.seed)?;
-    let (readings, sessions) = (reader.readings(Order::Taken)?, reader.sessions()?);
-    let left = resume::remainder(&setup.sequence.steps, &readings, &sessions);
-    if left.steps.is_empty() {
-        return Ok(None);
-    }
-    let mut job = first_job(&setup, OnFault::Wait);
-    job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
-    let rig = Arc::new(setup.rig.clone());
-    job.check = Some(resume::check(rig, &setup.sequence, &left, readings, false));
-    job.steps.clone_from(&left.steps);
-    job.done_before = left.done;
-    job.session = left.session;
-    job.session_began_s = left.began_s;
-    Ok(Some(job))
 }
 
 impl Shop {

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use firmware_protocol::Shutter;
+use radiometry::direction::wrap;
 
 use super::conductor::No;
 use crate::rig::{AxisPositions, Pose, Reading, Rig, forward};
@@ -37,7 +38,7 @@ impl Jog {
             x_m: self.x_m.unwrap_or(now.x_m),
             y_m: self.y_m.unwrap_or(now.y_m),
             theta_rad: self.theta_rad.unwrap_or(now.theta_rad),
-            phi_rad: self.phi_rad.unwrap_or(now.phi_rad),
+            phi_rad: self.phi_rad.map_or(now.phi_rad, wrap),
         }
     }
 }
