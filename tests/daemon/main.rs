@@ -50,7 +50,7 @@ fn a_run_is_queued_paused_continued_and_evaluated_and_events_replay() {
     let (status, fit) = daemon.get("/runs/1/fit");
     assert_eq!(status, 200);
     let error = fit["exitance_w_per_m2"]["value"].as_f64().unwrap()
-        / fit["truth"]["exitance_w_per_m2"].as_f64().unwrap()
+        / fit["truth"]["exitance_w_per_m2"]["value"].as_f64().unwrap()
         - 1.0;
     assert!(error.abs() < 0.05, "{error}");
 
