@@ -79,7 +79,7 @@ fn collect(folder: &Path, sources: &mut Vec<Source>) {
             if name != "target" && !name.starts_with('.') && name != "runs" {
                 collect(&path, sources);
             }
-        } else if name.ends_with(".rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
             let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
             sources.push(Source { path: relative, text: fs::read_to_string(&path).unwrap() });
         }

@@ -1,6 +1,11 @@
 //! The command line as written: commands and flags, parsed, with nothing resolved yet. What a
 //! flag means is documented here and nowhere else.
 
+// The documentation of a flag is its help: back-ticks would show on the terminal.
+#![allow(clippy::doc_markdown)]
+// Flags of a command are flags.
+#![allow(clippy::struct_excessive_bools)]
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};

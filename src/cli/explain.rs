@@ -1,5 +1,6 @@
 //! `gonio explain`: which effects a scene calls for, why, and what they amount to.
 
+use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use serde_json::json;
@@ -72,7 +73,11 @@ pub(crate) fn explain(args: &ExplainArgs) -> Outcome {
             row.how.clone(),
         ]);
     }
-    let notes: String = notes.iter().map(|note| format!("  note: {note}\n")).collect();
-    say(&(table(&rows) + &notes))?;
+    let mut text = table(&rows);
+    for note in notes {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  note: {note}");
+    }
+    say(&text)?;
     Ok(ExitCode::SUCCESS)
 }

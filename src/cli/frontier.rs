@@ -1,6 +1,7 @@
 //! `gonio frontier`: what accuracy costs in time. Runs a plan at several densities and dwells on
 //! the simulated rig, with several seeds, and scores every run against the truth.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -172,16 +173,18 @@ fn as_text(rows: &[FrontierRow], points: &[FrontierPoint]) -> String {
     let mut text = table(&lines);
     for pair in points.windows(2) {
         if let Some(words) = doubling(&pair[0], &pair[1]) {
-            text.push_str(&format!("  {words}\n"));
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "  {words}");
         }
     }
     let coverage = coverage(rows);
-    text.push_str(&format!(
-        "  exitance over {} runs: RMS of error over stated u {:.2}, {} within 2 u\n",
+    let _ = writeln!(
+        text,
+        "  exitance over {} runs: RMS of error over stated u {:.2}, {} within 2 u",
         rows.len(),
         coverage.rms_of_error_over_u,
         percent(coverage.within_2u),
-    ));
+    );
     text
 }
 

@@ -63,7 +63,7 @@ enum Whose {
     /// A daemon has it.
     Daemons(Client),
     /// Opened for this one command.
-    Ours(Bench),
+    Ours(Box<Bench>),
 }
 
 fn whose(args: &HandArgs) -> Result<Whose, Failure> {
@@ -75,7 +75,7 @@ fn whose(args: &HandArgs) -> Result<Whose, Failure> {
     let rig = rig.ok_or_else(|| {
         Failure::with_help("no rig to drive", "give one with --rig, or --daemon where one owns it")
     })?;
-    Ok(Whose::Ours(Bench::of(args, inputs, rig)?))
+    Ok(Whose::Ours(Box::new(Bench::of(args, inputs, rig)?)))
 }
 
 /// The pose that is asked for.

@@ -56,13 +56,13 @@ pub fn points(rows: &[FrontierRow]) -> Vec<FrontierPoint> {
     }
     let mut points: Vec<FrontierPoint> = parameters
         .iter()
-        .map(|name| point(name, rows.iter().filter(|row| row.parameters == *name)))
+        .map(|name| point(name, &rows.iter().filter(|row| row.parameters == *name)))
         .collect();
     points.sort_by(|a, b| a.rig_s.total_cmp(&b.rig_s));
     points
 }
 
-fn point<'a>(name: &str, rows: impl Iterator<Item = &'a FrontierRow> + Clone) -> FrontierPoint {
+fn point<'a>(name: &str, rows: &(impl Iterator<Item = &'a FrontierRow> + Clone)) -> FrontierPoint {
     let spread = |value: fn(&FrontierRow) -> f64| {
         let mut values: Vec<f64> = rows.clone().map(value).collect();
         values.sort_by(f64::total_cmp);
@@ -152,7 +152,9 @@ mod tests {
         let points = points(&rows);
         assert_eq!(points.len(), 2);
         assert_eq!(points[0].parameters, "a");
-        assert_eq!(points[0].radiance, [0.02, 0.03, 0.04]);
+        for (found, expected) in points[0].radiance.iter().zip([0.02, 0.03, 0.04]) {
+            assert!((found - expected).abs() < 1e-15);
+        }
         assert!((points[0].exitance_rms - libm::sqrt(0.001)).abs() < 1e-15);
     }
 

@@ -297,11 +297,10 @@ impl Machine {
         }
         match input {
             Input::Connected(connected) => self.on_connected(connected),
-            Input::Accepted(_) => {}
             Input::Rejected(id, rejection) => self.on_rejected(id, rejection),
             // A stop since then has latched it again.
             Input::Cleared if self.latch == Latch::Clearing => self.latch = Latch::Open,
-            Input::Cleared => {}
+            Input::Accepted(_) | Input::Cleared => {}
             Input::ClearRefused(rejection) => self.on_clear_refused(rejection),
             Input::Stopping => self.stop_confirmed = true,
             Input::Event(event) => self.on_event(now, event),
