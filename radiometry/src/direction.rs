@@ -41,12 +41,23 @@ pub fn angles(direction: DVec3) -> (f64, f64) {
 
 /// An angle brought into (-π, π] by whole turns of the true 2π (the library reduces exactly; taking
 /// off the double nearest 2π is off by 2.4e-16 a turn).
+///
+/// ```
+/// use std::f64::consts::PI;
+/// assert_eq!(radiometry::direction::wrap(1.0), 1.0);
+/// assert!((radiometry::direction::wrap(3.5 * PI) + 0.5 * PI).abs() < 1e-14);
+/// ```
 pub fn wrap(angle: f64) -> f64 {
     let (sin, cos) = libm::sincos(angle);
     libm::atan2(sin, cos)
 }
 
 /// An angle in degrees brought into (-180, 180], exactly.
+///
+/// ```
+/// assert_eq!(radiometry::direction::wrap_deg(540.0), 180.0);
+/// assert_eq!(radiometry::direction::wrap_deg(190.0), -170.0);
+/// ```
 pub fn wrap_deg(angle_deg: f64) -> f64 {
     let wrapped = libm::remainder(angle_deg, 360.0);
     if wrapped <= -180.0 { 180.0 } else { wrapped }
@@ -54,6 +65,11 @@ pub fn wrap_deg(angle_deg: f64) -> f64 {
 
 /// The rotation from one angle to another by the shorter way, in (-π, π], exact for nearly equal
 /// angles and across the seam.
+///
+/// ```
+/// use radiometry::direction::shortest_rotation;
+/// assert!((shortest_rotation(3.0, -3.0) - (std::f64::consts::TAU - 6.0)).abs() < 1e-15);
+/// ```
 pub fn shortest_rotation(from: f64, to: f64) -> f64 {
     let (difference, rest) = two_sum(to, -from);
     let (sin, cos) = libm::sincos(difference);
@@ -84,6 +100,13 @@ pub fn angle_between(a: DVec3, b: DVec3) -> f64 {
 
 /// The angle between the directions (θ₁, φ₁) and (θ₂, φ₂), in [0, π], from the angles themselves:
 /// haversine and its exact complement, so that neither end loses digits.
+///
+/// ```
+/// use radiometry::direction::angular_distance;
+/// // Across the pole, half a radian on either side.
+/// let found = angular_distance(0.5, 1.0, 0.5, 1.0 + std::f64::consts::PI);
+/// assert!((found - 1.0).abs() < 1e-15);
+/// ```
 pub fn angular_distance(theta_1: f64, phi_1: f64, theta_2: f64, phi_2: f64) -> f64 {
     let (sin_difference, cos_difference) = libm::sincos((theta_2 - theta_1) / 2.0);
     let (sin_sum, cos_sum) = libm::sincos(f64::midpoint(theta_1, theta_2));

@@ -25,6 +25,13 @@ pub fn cone(half_angle_rad: f64) -> Result<SolidAngle, DomainError> {
 
 /// Projected solid angle of a cone about the receiver's normal: π sin² h; the hemisphere's π from
 /// h = π/2 on, since the horizon cuts the rest off.
+///
+/// ```
+/// use radiometry::solid_angle::cone_projected;
+/// let quarter = cone_projected(std::f64::consts::FRAC_PI_6)?;
+/// assert!((quarter.sr() - std::f64::consts::PI / 4.0).abs() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
 pub fn cone_projected(half_angle_rad: f64) -> Result<ProjectedSolidAngle, DomainError> {
     let half_angle = within("half_angle_rad", half_angle_rad, 0.0, PI)?;
     let sin = libm::sin(half_angle.min(FRAC_PI_2));
@@ -32,6 +39,13 @@ pub fn cone_projected(half_angle_rad: f64) -> Result<ProjectedSolidAngle, Domain
 }
 
 /// Half angle of the cone of a solid angle in [0, 4π] sr: 2 asin √(Ω/4π).
+///
+/// ```
+/// use radiometry::{quantity::SolidAngle, solid_angle::cone_half_angle};
+/// let hemisphere = SolidAngle::from_sr(2.0 * std::f64::consts::PI);
+/// assert!((cone_half_angle(hemisphere)? - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
 pub fn cone_half_angle(solid_angle: SolidAngle) -> Result<f64, DomainError> {
     let solid_angle = within("solid_angle_sr", solid_angle.sr(), 0.0, WHOLE_SPHERE)?;
     Ok(2.0 * libm::asin((solid_angle / WHOLE_SPHERE).sqrt().min(1.0)))
@@ -39,6 +53,14 @@ pub fn cone_half_angle(solid_angle: SolidAngle) -> Result<f64, DomainError> {
 
 /// Solid angle between two cones about one axis: 4π sin((a+b)/2) sin((b-a)/2), half angles
 /// 0 <= a <= b <= π.
+///
+/// ```
+/// use radiometry::solid_angle::annulus;
+/// // From the horizon to 120°: 2π (cos 90° - cos 120°).
+/// let zone = annulus(std::f64::consts::FRAC_PI_2, 2.0 * std::f64::consts::FRAC_PI_3)?;
+/// assert!((zone.sr() - std::f64::consts::PI).abs() < 1e-14);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
 pub fn annulus(inner_rad: f64, outer_rad: f64) -> Result<SolidAngle, DomainError> {
     let outer = within("outer_rad", outer_rad, 0.0, PI)?;
     let inner = within("inner_rad", inner_rad, 0.0, outer)?;
@@ -48,6 +70,13 @@ pub fn annulus(inner_rad: f64, outer_rad: f64) -> Result<SolidAngle, DomainError
 
 /// Solid angle of a disk seen from its axis: 2π r²/(s(s+d)), s = √(r²+d²). A disk of no radius
 /// has none, from any distance; one touched by the receiver fills the hemisphere.
+///
+/// ```
+/// use radiometry::solid_angle::disk;
+/// // 2π (1 - d/s) with the sides 3, 4 and 5.
+/// assert!((disk(3.0, 4.0)?.sr() - 0.4 * std::f64::consts::PI).abs() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
 pub fn disk(radius_m: f64, distance_m: f64) -> Result<SolidAngle, DomainError> {
     let radius = not_negative("radius_m", radius_m)?;
     let distance = not_negative("distance_m", distance_m)?;

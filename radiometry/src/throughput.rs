@@ -79,6 +79,14 @@ impl CoaxialDisks {
 
     /// F₁₂, the part of the diffuse flux from disk 1 that meets disk 2, in [0, 1]:
     /// 2 r₂² / (h² + r₁² + r₂² + q).
+    ///
+    /// ```
+    /// use radiometry::throughput::CoaxialDisks;
+    /// // Equal disks one radius apart: (3 - √5) / 2.
+    /// let factor = CoaxialDisks::new(1.0, 1.0, 1.0)?.form_factor();
+    /// assert!((factor.ratio() - (3.0 - 5.0_f64.sqrt()) / 2.0).abs() < 1e-15);
+    /// # Ok::<(), radiometry::DomainError>(())
+    /// ```
     pub fn form_factor(self) -> FormFactor {
         let (_, disks) = self.in_units_of_the_largest();
         let radius_2 = disks.radius_2_m;

@@ -90,6 +90,16 @@ impl Zernike {
     /// panics). At π/2: √π for the constant, 0 for all others.
     ///
     /// Source: ∫ Pₖ dx = (Pₖ₊₁ - Pₖ₋₁)/(2k+1) with x = 2r² - 1.
+    ///
+    /// ```
+    /// let zernike = radiometry::basis::Zernike::new(2);
+    /// let mut values = [0.0; 6];
+    /// zernike.integrals_within(std::f64::consts::FRAC_PI_6, &mut values)?;
+    /// // Z₀ = 1/√π over π sin² 30°; nothing of what goes round with φ.
+    /// assert!((values[0] - std::f64::consts::PI.sqrt() / 4.0).abs() < 1e-15);
+    /// assert_eq!(values[1], 0.0);
+    /// # Ok::<(), radiometry::DomainError>(())
+    /// ```
     pub fn integrals_within(&self, theta_max: f64, values: &mut [f64]) -> Result<(), DomainError> {
         assert_eq!(values.len(), self.len(), "one value a polynomial");
         let theta_max = within("theta_max_rad", theta_max, 0.0, FRAC_PI_2)?;
