@@ -227,14 +227,6 @@ pub(super) fn reading(connection: &Connection, id: u32) -> rusqlite::Result<Read
 }
 
 fn reading_from_row(row: &Row<'_>) -> rusqlite::Result<Reading> {
-    let latched = |first: usize| -> rusqlite::Result<Latched> {
-        Ok(Latched([
-            row.get(first)?,
-            row.get(first + 1)?,
-            row.get(first + 2)?,
-            row.get(first + 3)?,
-        ]))
-    };
     Ok(Reading {
         id: row.get(1)?,
         kind: kind_from_row(row, 2)?,
@@ -245,9 +237,9 @@ fn reading_from_row(row: &Row<'_>) -> rusqlite::Result<Reading> {
         min: row.get(9)?,
         max: row.get(10)?,
         saturated: row.get(11)?,
-        commanded: latched(12)?,
-        start: latched(16)?,
-        end: latched(20)?,
+        commanded: latched_from_row(row, 12)?,
+        start: latched_from_row(row, 16)?,
+        end: latched_from_row(row, 20)?,
         start_us: row.get(24)?,
         end_us: row.get(25)?,
         time_s: row.get(26)?,
@@ -255,6 +247,11 @@ fn reading_from_row(row: &Row<'_>) -> rusqlite::Result<Reading> {
         link_retries: row.get(28)?,
         unsettled: row.get(29)?,
     })
+}
+
+/// Counts from four columns, in the axes' order.
+pub(super) fn latched_from_row(row: &Row<'_>, first: usize) -> rusqlite::Result<Latched> {
+    Ok(Latched([row.get(first)?, row.get(first + 1)?, row.get(first + 2)?, row.get(first + 3)?]))
 }
 
 /// A kind from three columns: its name, the target's index and repeat.

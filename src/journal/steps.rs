@@ -8,7 +8,7 @@ use rusqlite::types::Type;
 use rusqlite::{Connection, Row, params};
 
 use super::append::kind_columns;
-use super::read::kind_from_row;
+use super::read::{kind_from_row, latched_from_row};
 use crate::plan::Step;
 use crate::rig::{AxisPositions, Latched, Pose};
 
@@ -62,27 +62,19 @@ pub(super) fn insert(connection: &Connection, step: &Step) -> rusqlite::Result<(
 }
 
 pub(super) fn from_row(row: &Row<'_>) -> rusqlite::Result<Step> {
-    let latched = |first: usize| -> rusqlite::Result<Latched> {
-        Ok(Latched([
-            row.get(first)?,
-            row.get(first + 1)?,
-            row.get(first + 2)?,
-            row.get(first + 3)?,
-        ]))
-    };
     let pose = match row.get::<_, Option<f64>>(4)? {
         None => None,
         Some(x_m) => {
             Some(Pose { x_m, y_m: row.get(5)?, theta_rad: row.get(6)?, phi_rad: row.get(7)? })
         }
     };
-    let via = row.get::<_, Option<i32>>(16)?.map(|_| latched(16)).transpose()?;
+    let via = row.get::<_, Option<i32>>(16)?.map(|_| latched_from_row(row, 16)).transpose()?;
     Ok(Step {
         id: row.get(0)?,
         kind: kind_from_row(row, 1)?,
         pose,
         positions: AxisPositions([row.get(8)?, row.get(9)?, row.get(10)?, row.get(11)?]),
-        counts: latched(12)?,
+        counts: latched_from_row(row, 12)?,
         via,
         settle: duration(row, 20)?,
         gain: row.get(21)?,
