@@ -232,13 +232,27 @@ fn spectrum(
     let mut triangle = Triangle::new(terms, 0);
     let mut scratch = basis.scratch();
     let mut row = vec![0.0; terms];
+    let mut largest = vec![0.0_f64; terms];
     for ray in rays {
         fill(ray, &mut scratch, &mut row);
+        for (largest, value) in largest.iter_mut().zip(&row) {
+            *largest = largest.max(value.abs());
+        }
+    }
+    for ray in rays {
+        fill(ray, &mut scratch, &mut row);
+        // sin 2φ on the lines φ = 0 and 90° is what the sine's last digit leaves, and columns are
+        // compared by direction, whatever their length.
+        for (value, largest) in row.iter_mut().zip(&largest) {
+            *value = if *largest < ROUNDING { 0.0 } else { *value };
+        }
         triangle.absorb(&row);
     }
     triangle.solve()?.spectrum()
 }
 
+/// A basis function, which is of order 1, vanishes on the rays where it stays below this.
+const ROUNDING: f64 = 1e-12;
 /// Most functions that are named.
 const NAMES_MAX: usize = 8;
 /// A function with less than this share in the undetermined combinations isn't named.

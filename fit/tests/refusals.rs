@@ -111,6 +111,18 @@ fn scatter_about_too_few_azimuths_is_no_information() {
 }
 
 #[test]
+fn a_term_that_vanishes_on_all_azimuths_measured_is_named() {
+    let mut rays = raster_rays(&REGION, 3, 5, 4);
+    for (k, ray) in rays.iter_mut().enumerate() {
+        ray.phi_rad = [0.0, 0.5, 1.0, -0.5][k % 4] * std::f64::consts::PI;
+    }
+    let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+    let text = refusal(&exact(&rays, |_| 1.0), &REGION, basis);
+    says(&text, "5 of 6 coefficients are determined; only 2 distinct azimuth lines");
+    says(&text, "most involved: Z(2,-2)");
+}
+
+#[test]
 fn too_few_positions_are_counted_by_axis() {
     let text = refused_rays(|ray| ray.x_m = if ray.x_m < 0.0 { -0.01 } else { 0.01 });
     says(&text, "only 2 distinct positions in x: degree 2 needs 3");
