@@ -4,6 +4,7 @@
 use std::io::{self, BufWriter, ErrorKind, Write};
 
 use super::failure::Failure;
+use crate::export::cause;
 
 /// Writes a text that has its line ends.
 pub(crate) fn say(text: &str) -> Result<(), Failure> {
@@ -29,7 +30,7 @@ pub(crate) fn write_out(
     // What could not be written is dropped here, not tried once more.
     drop(out.into_parts());
     match written {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+        Err(error) if cause(&error) != ErrorKind::BrokenPipe => {
             Err(Failure::midway(format!("standard output: {error}")))
         }
         _ => Ok(()),

@@ -50,16 +50,19 @@ pub fn write_atomically(
     })
 }
 
-/// Whether the disk, or what the user may take of it, is at its end. The writer of CSV wraps the
-/// system's error in its own.
+/// Whether the disk, or what the user may take of it, is at its end.
 fn is_disk_full(error: &io::Error) -> bool {
-    if let Some(wrapped) = error.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>()) {
-        return matches!(wrapped.kind(), csv::ErrorKind::Io(error) if is_disk_full(error));
+    use ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(cause(error), FileTooLarge | QuotaExceeded | StorageFull)
+}
+
+/// What the system said: the writer of CSV wraps its error in one of its own.
+pub fn cause(error: &io::Error) -> ErrorKind {
+    let wrapped = error.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
+    match wrapped.map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(inner)) => cause(inner),
+        _ => error.kind(),
     }
-    matches!(
-        error.kind(),
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge
-    )
 }
 
 fn write_and_rename(

@@ -19,7 +19,7 @@ mod samples_meta;
 mod tests;
 
 pub use accuracy::{AccuracyPoint, write_accuracy};
-pub use atomic::{ExportError, write_atomically};
+pub use atomic::{ExportError, cause, write_atomically};
 pub use fit_file::{FitFile, TruePeak, Truth};
 pub use frontier::write_frontier;
 pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};
