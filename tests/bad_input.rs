@@ -209,13 +209,14 @@ fn samples_from_elsewhere_are_refused_by_line_and_column() {
 #[test]
 fn a_folder_that_is_no_run_is_refused_and_stays_as_it_was() {
     let bench = Bench::small().having("run.sqlite", b"not a database, though long enough");
-    for command in [&["export", ".", "--format", "csv"][..], &["fit", "."]] {
+    for command in [&["export", ".", "--format", "csv"][..], &["fit", "."], &["resume", "."]] {
         refused(&bench, command, &["run.sqlite: not a run's journal"]);
     }
     std::fs::write(bench.path("run.sqlite"), b"").unwrap();
-    refused(&bench, &["fit", "."], &["run.sqlite: empty", "start it again"]);
+    refused(&bench, &["resume", "."], &["run.sqlite: empty", "start it again"]);
     std::fs::remove_file(bench.path("run.sqlite")).unwrap();
-    refused(&bench, &["fit", "."], &["run.sqlite: no such file", "a run's folder"]);
+    refused(&bench, &["resume", "."], &["run.sqlite: no such file", "a run's folder"]);
+    refused(&bench, &["resume", "gone"], &["run.sqlite: no such file"]);
     refused(&bench, &["export", "gone", "--format", "csv"], &["no such file"]);
 }
 
@@ -266,6 +267,7 @@ fn a_port_that_is_none_is_named() {
     let bench = Bench::small().at_port("/dev/nonexistent");
     let parts = ["/dev/nonexistent: no such port", "`gonio ports` lists"];
     refused(&bench, &["run", "plan.toml", "--out", "out"], &parts);
+    refused(&bench, &["home", "--rig", "rig.toml"], &parts);
 }
 
 #[test]

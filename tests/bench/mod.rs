@@ -7,13 +7,13 @@ pub(crate) mod device;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
 /// A command that takes longer has lost its way.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 const PLAN: &str = r#"name = "small"
 rig = "rig.toml"
@@ -29,7 +29,7 @@ kind = "raster"
 x_count = 2
 y_count = 2
 theta_step_deg = 20
-phi_step_deg = 90
+phi_step_deg = 45
 order = "travel"
 
 [dwell]
@@ -238,6 +238,12 @@ impl std::fmt::Display for Said {
         let Self { command, code, out, err } = self;
         write!(f, "$ {command}\n[exit code {code:?}]\n{out}\n[standard error]\n{err}")
     }
+}
+
+/// Sends a signal by its name.
+pub(crate) fn signal(child: &Child, name: &str) {
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", name, &pid]).status().unwrap().success());
 }
 
 pub(crate) fn repository() -> &'static Path {
