@@ -88,6 +88,34 @@ impl Shop {
         }
     }
 
+    /// A run that is carried on must find the rig and the scene that it was begun with; only the
+    /// port may be another one.
+    fn compare_run(&self, begun: &Setup) -> Result<(), Refusal> {
+        let refuse = |what: &str, help: &str| {
+            let error = format!("the run was begun with another {what} than the daemon's");
+            Err(Refusal::new(error).with_help(help))
+        };
+        let (ours, its) = (&self.rig, &begun.rig);
+        let is_ours = (&its.name, &its.axes, &its.detector, its.is_simulated())
+            == (&ours.name, &ours.axes, &ours.detector, ours.is_simulated());
+        if !is_ours {
+            return refuse("rig", "start the daemon with the rig.toml in the run's folder");
+        }
+        if self.stage.is_none() {
+            return Ok(());
+        }
+        if begun.seed != self.seed {
+            return refuse("seed", &format!("start the daemon with --seed {}", begun.seed));
+        }
+        let scene = begun.inputs.iter().find(|input| input.role == InputRole::Scene);
+        let is_ours = scene.map(|scene| &scene.bytes)
+            == self.ours(InputRole::Scene).map(|scene| &scene.bytes);
+        if !is_ours {
+            return refuse("scene", "start the daemon with the scene.toml in the run's folder");
+        }
+        Ok(())
+    }
+
     /// Files go by their names: ours must not be taken for theirs.
     fn compare_attachment(&self, sent: &Input) -> Result<(), Refusal> {
         let differs = |ours: &&Input| {
@@ -139,6 +167,7 @@ impl Workshop for Shop {
             Err(error) => return Err(Refusal::new(error.to_string())),
             Ok(journal) => {
                 let (setup, left) = what_is_left(&path).map_err(refuse)?;
+                self.compare_run(&setup)?;
                 // A reference that has moved is a fault; to say continue once more accepts it.
                 let job =
                     resume::job(&setup, &path, &left, false, OnFault::Wait).map_err(refuse)?;
