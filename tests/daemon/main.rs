@@ -142,6 +142,84 @@ fn after_a_kill_nothing_moves_before_a_person_says_so_and_nothing_is_measured_tw
 }
 
 #[test]
+fn a_run_is_not_carried_on_in_front_of_another_scene() {
+    let place = Place::new();
+    let mut daemon = place.daemon();
+    daemon.post("/runs", &bundle(&place));
+    daemon.wait_for_readings(1, 2);
+    daemon.kill();
+    let scene = place.scene();
+    place.write("scene.toml", &scene.replace("50", "60"));
+    let mut daemon = place.daemon();
+    assert_eq!(daemon.post("/runs/1/continue", "").0, 200);
+    wait_until("it says why not", || {
+        let (_, run) = daemon.get("/runs/1");
+        run["detail"].as_str().unwrap().contains("begun with another scene")
+    });
+    assert_eq!(daemon.state_of(1), "interrupted");
+    daemon.kill();
+    place.write("scene.toml", &scene);
+    let daemon = place.daemon();
+    daemon.post("/runs/1/continue", "");
+    daemon.wait_for(1, "complete");
+}
+
+#[test]
+fn over_a_serial_line_a_killed_daemon_loses_nothing_and_measures_nothing_twice() {
+    let place = Place::new();
+    let _device = place.device_on_a_pseudo_terminal("wire");
+    place.write_serial_rig("wire");
+    let mut daemon = place.daemon_of(&["--rig", "serial.toml"]);
+    // The plan alone: the daemon's own rig is meant.
+    let plan = json!({"role": "plan", "name": "plan.toml", "text": place.plan()});
+    let (status, submitted) = daemon.post("/runs", &json!({"files": [plan]}).to_string());
+    assert_eq!((status, &submitted["simulated"]), (201, &json!(false)), "{submitted}");
+    daemon.wait_for_readings(1, 5);
+    daemon.post("/runs/1/pause", "");
+    daemon.wait_for(1, "paused");
+    daemon.post("/runs/1/continue", "");
+    daemon.wait_for_readings(1, 15);
+    daemon.kill();
+    let daemon = place.daemon_of(&["--rig", "serial.toml"]);
+    assert_eq!(daemon.state_of(1), "interrupted");
+    daemon.post("/runs/1/continue", "");
+    daemon.wait_for(1, "complete");
+    let steps: Vec<_> = daemon.ids_of(1).into_iter().filter(|id| *id < 0x8000_0000).collect();
+    assert_eq!(steps, (0..steps.len() as u64).collect::<Vec<_>>());
+    // A line a target, and the header.
+    assert_eq!(place.samples("1-small").len(), 41);
+}
+
+#[test]
+fn a_rig_that_is_not_there_is_waited_for() {
+    let place = Place::new();
+    place.write_serial_rig("wire");
+    let daemon = place.daemon_of(&["--rig", "serial.toml"]);
+    let (status, refused) = daemon.post("/rig/home", "");
+    assert_eq!(status, 502, "{refused}");
+    let plan = json!({"role": "plan", "name": "plan.toml", "text": place.plan()});
+    daemon.post("/runs", &json!({"files": [plan]}).to_string());
+    wait_until("the run says what is wrong", || {
+        let detail = daemon.get("/runs/1").1["detail"].as_str().unwrap().to_owned();
+        detail.contains("wire")
+    });
+    let _device = place.device_on_a_pseudo_terminal("wire");
+    daemon.post("/runs/1/continue", "");
+    daemon.wait_for(1, "complete");
+}
+
+#[test]
+fn a_client_that_says_nothing_does_not_keep_it() {
+    let place = Place::new();
+    let daemon = place.daemon();
+    let _silent = std::os::unix::net::UnixStream::connect(place.socket()).unwrap();
+    std::thread::sleep(Duration::from_millis(100));
+    let began = std::time::Instant::now();
+    assert!(daemon.terminate().success());
+    assert!(began.elapsed() < Duration::from_secs(4), "{:?}", began.elapsed());
+}
+
+#[test]
 fn a_stop_brings_the_run_to_rest_tells_who_watches_and_ends_at_once() {
     let place = Place::new();
     let daemon = place.daemon();

@@ -84,11 +84,19 @@ impl Place {
             .replace("speed_mm_per_s = 100", "speed_mm_per_s = 500")
             .replace("acceleration_mm_per_s2 = 500", "acceleration_mm_per_s2 = 10000")
             .replace("settle_ms = 50", "settle_ms = 5");
-        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
-        write("rig.toml", &rig).unwrap();
-        write("scene.toml", &read("scene.toml")).unwrap();
-        write("plan.toml", PLAN).unwrap();
-        Self { folder }
+        let place = Self { folder };
+        place.write("rig.toml", &rig);
+        place.write("scene.toml", &read("scene.toml"));
+        place.write("plan.toml", PLAN);
+        place
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
     }
 
     fn read(&self, name: &str) -> String {
@@ -105,6 +113,14 @@ impl Place {
 
     pub(crate) fn scene(&self) -> String {
         self.read("scene.toml")
+    }
+
+    /// serial.toml: the same rig at the end of a serial line.
+    pub(crate) fn write_serial_rig(&self, port: &str) {
+        let link = format!("kind = \"serial\"\nport = \"{}\"", self.path(port).display());
+        let rig = self.rig().replace("kind = \"simulated\"", &link);
+        let (rig, _) = rig.split_once("\n[simulated]").unwrap();
+        self.write("serial.toml", rig);
     }
 
     pub(crate) fn socket(&self) -> PathBuf {
@@ -125,9 +141,22 @@ impl Place {
     }
 
     pub(crate) fn command(&self, listen: &str) -> Command {
+        self.command_of(&["--rig", "rig.toml", "--scene", "scene.toml"], listen)
+    }
+
+    fn command_of(&self, rig: &[&str], listen: &str) -> Command {
         let listening = ["--data", "data", "--listen", listen];
-        let rig = ["daemon", "--rig", "rig.toml", "--scene", "scene.toml"];
-        self.gonio(&[&rig[..], &listening[..]].concat())
+        self.gonio(&[&["daemon"], rig, &listening[..]].concat())
+    }
+
+    /// `gonio sim`, until it is dropped.
+    pub(crate) fn device_on_a_pseudo_terminal(&self, link: &str) -> Device {
+        let rig = ["--rig", "rig.toml", "--scene", "scene.toml"];
+        let mut command = self.gonio(&[&["sim", "--pty", link], &rig[..]].concat());
+        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let device = Device(child);
+        wait_until("the pseudo-terminal is there", || self.path(link).exists());
+        device
     }
 
     /// On the default socket.
@@ -136,14 +165,33 @@ impl Place {
     }
 
     pub(crate) fn daemon_at(&self, listen: &str) -> Served {
-        let mut child = self.command(listen).stderr(Stdio::piped()).spawn().unwrap();
-        let mut lines = BufReader::new(child.stderr.take().unwrap());
-        let mut line = String::new();
-        lines.read_line(&mut line).unwrap();
-        let address = line.trim().rsplit_once("listening at ").map(|(_, at)| at.to_owned());
-        // What else it says must not fill the pipe.
-        std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::stderr()));
-        Served { address: address.unwrap_or_else(|| panic!("it says: {line}")), child }
+        served(self.command(listen))
+    }
+
+    /// A daemon of another rig than the simulated one, on the default socket.
+    pub(crate) fn daemon_of(&self, rig: &[&str]) -> Served {
+        served(self.command_of(rig, &format!("unix:{}", self.socket().display())))
+    }
+}
+
+fn served(mut command: Command) -> Served {
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    lines.read_line(&mut line).unwrap();
+    let address = line.trim().rsplit_once("listening at ").map(|(_, at)| at.to_owned());
+    // What else it says must not fill the pipe.
+    std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::stderr()));
+    Served { address: address.unwrap_or_else(|| panic!("it says: {line}")), child }
+}
+
+/// A simulated device in a process of its own.
+pub(crate) struct Device(Child);
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
