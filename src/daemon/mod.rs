@@ -1,7 +1,7 @@
 //! The long-running owner of a rig: a queue that survives a restart, HTTP for programs and
 //! people, and events with numbers.
 //!
-//! HTTP and the queue go by the real clock on the runtime that calls [`serve`]; the rig lives on a
+//! HTTP and the queue go by the real clock on the runtime that calls [`Daemon::serve`]; the rig lives on a
 //! thread of its own ([`RigThread`]). How files become a run and readings become results is
 //! the [`Workshop`]'s: the daemon knows no file that people write, and not what a rig is made of.
 
@@ -41,7 +41,7 @@ use crate::run::{OwnerHandle, Source};
 /// Orders that wait for the conductor, at most.
 const ORDERS: usize = 64;
 /// How long open requests may take to end once the rig is at rest.
-const CLOSE_WITHIN: Duration = Duration::from_secs(2);
+const CLOSE_WITHIN: Duration = Duration::from_secs(6);
 
 /// Where a daemon keeps its data, and where it listens.
 #[derive(Debug, Clone, PartialEq, Eq)]

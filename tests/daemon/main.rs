@@ -10,8 +10,15 @@ use serde_json::{Value, json};
 
 use served::{Place, bundle, wait_until};
 
+/// Far below what the daemon grants clients that do not leave, on a machine that is busy.
+const AT_ONCE: Duration = Duration::from_secs(4);
+
 fn sequence_of(events: &[Value]) -> Vec<i64> {
     events.iter().map(|event| event["sequence"].as_i64().unwrap()).collect()
+}
+
+fn rise_from_1(events: &[Value]) -> bool {
+    sequence_of(events).into_iter().zip(1..).all(|(number, expected)| number == expected)
 }
 
 fn kinds_of(events: &[Value]) -> Vec<&str> {
@@ -58,8 +65,7 @@ fn a_run_is_queued_paused_continued_and_evaluated_and_events_replay() {
     let wanted =
         ["daemon_started", "submitted", "started", "paused", "continued", "evaluating", "complete"];
     assert!(occur_in_order(&kinds_of(&events), &wanted), "{:?}", kinds_of(&events));
-    let numbers = sequence_of(&events);
-    assert_eq!(numbers, (1..=numbers.len() as i64).collect::<Vec<_>>());
+    assert!(rise_from_1(&events), "{:?}", sequence_of(&events));
     let later = daemon.events_after(3, "complete");
     assert_eq!(later, events[3..]);
 }
@@ -216,7 +222,7 @@ fn a_client_that_says_nothing_does_not_keep_it() {
     std::thread::sleep(Duration::from_millis(100));
     let began = std::time::Instant::now();
     assert!(daemon.terminate().success());
-    assert!(began.elapsed() < Duration::from_secs(4), "{:?}", began.elapsed());
+    assert!(began.elapsed() < AT_ONCE, "{:?}", began.elapsed());
 }
 
 #[test]
@@ -242,7 +248,7 @@ fn a_stop_brings_the_run_to_rest_tells_who_watches_and_ends_at_once() {
     std::thread::sleep(Duration::from_millis(200));
     let began = std::time::Instant::now();
     assert!(daemon.terminate().success());
-    assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+    assert!(began.elapsed() < AT_ONCE, "{:?}", began.elapsed());
     assert_eq!(*kinds_of(&watcher.join().unwrap()).last().unwrap(), "daemon_stopping");
 }
 
@@ -367,7 +373,7 @@ fn the_commands_speak_to_it() {
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
     let events: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(sequence_of(&events), (1..=events.len() as i64).collect::<Vec<_>>());
+    assert!(rise_from_1(&events), "{:?}", sequence_of(&events));
     assert_eq!(*kinds_of(&events).last().unwrap(), "daemon_stopping");
 
     let (code, _, error) = run(&["status"]);

@@ -199,18 +199,14 @@ trait Stream: Read + Write + Send {}
 impl<S: Read + Write + Send> Stream for S {}
 
 fn connect(address: &str) -> Box<dyn Stream> {
-    match address.strip_prefix("unix:") {
-        Some(path) => {
-            let stream = UnixStream::connect(path).unwrap();
-            stream.set_read_timeout(Some(PATIENCE)).unwrap();
-            Box::new(stream)
-        }
-        None => {
-            let stream = TcpStream::connect(address).unwrap();
-            stream.set_read_timeout(Some(PATIENCE)).unwrap();
-            Box::new(stream)
-        }
+    if let Some(path) = address.strip_prefix("unix:") {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        return Box::new(stream);
     }
+    let stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    Box::new(stream)
 }
 
 impl Served {
