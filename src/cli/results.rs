@@ -181,8 +181,7 @@ fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Op
                 phi_rad: peak.phi_rad,
             },
         }),
-        // A sample without any light has no relative error; a fit that is dark too has none.
-        radiance_error_rms_relative: score.map_or(0.0, |score| score.rms_relative),
+        radiance_error_rms_relative: score.map(|score| score.rms_relative),
     };
     Some((stated, score))
 }

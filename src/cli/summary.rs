@@ -69,9 +69,10 @@ impl Summary<'_> {
             ));
         }
         if let Some(fraction) = fit.measured_fraction() {
-            rows.push(row("of it measured", percent(fraction)));
+            let theta_max_deg = self.setup.region().theta_max_rad.to_degrees();
+            rows.push(row(&format!("of it within {theta_max_deg:.0}°"), percent(fraction)));
         }
-        if let Some(truth) = &self.results.truth {
+        if let Some(truth) = self.results.truth.filter(|truth| truth.exitance > 0.0) {
             let error = exitance.value - truth.exitance;
             let relative = percent(error / truth.exitance);
             let in_u = error / exitance.u;
@@ -79,8 +80,10 @@ impl Summary<'_> {
                 "error of exitance",
                 format!("{relative} ({in_u:+.2} u) against the simulator's truth"),
             ));
-            let rms = percent(truth.radiance_error_rms_relative);
-            rows.push(row("error of radiance", format!("{rms} RMS over the region")));
+            if let Some(rms) = truth.radiance_error_rms_relative {
+                let rms = percent(rms);
+                rows.push(row("error of radiance", format!("{rms} RMS over the region")));
+            }
         }
         rows
     }

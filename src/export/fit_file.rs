@@ -38,8 +38,8 @@ pub struct Truth {
     /// The largest radiance within the region; `None` where it has no bound.
     pub peak: Option<TruePeak>,
     /// Throughput-weighted RMS of fitted less true radiance within the region, divided by that of
-    /// the true one.
-    pub radiance_error_rms_relative: f64,
+    /// the true one; `None` where that is dark.
+    pub radiance_error_rms_relative: Option<f64>,
 }
 
 /// The largest radiance within the region, and where it is.
@@ -217,7 +217,7 @@ mod tests {
             exitance_within_region: 305.0,
             flux: 0.04 * PI,
             peak: Some(TruePeak { value: 100.0, ray }),
-            radiance_error_rms_relative: 1e-3,
+            radiance_error_rms_relative: Some(1e-3),
         };
         let quantity = Quantity::Radiance;
         let file = FitFile {
