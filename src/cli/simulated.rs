@@ -13,13 +13,14 @@ use super::args::SimArgs;
 use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs};
 use super::output::{note, say};
+use super::session::draw_session;
 use super::setup::{Stage, rig_at, stage_at};
 use crate::device::{Link, Opener, opener};
 
 /// Bytes that wait between host and wire: as much as a serial port's driver buffers.
 const STREAM_BYTES: usize = 4096;
-/// The boot of a device that was just switched on.
-const FIRST_BOOT: u32 = 1;
+/// The boot of a device that lives as long as this process: every run's is the same.
+const OWN_BOOT: u32 = 1;
 
 /// A simulated device that is switched on: every link leads to the same one.
 #[derive(Debug, Clone)]
@@ -31,7 +32,7 @@ impl SimulatedDevice {
     /// Switches a device on, as a task of the current runtime; it goes by that runtime's clock.
     pub(crate) fn switch_on(stage: &Stage, baud: u32) -> Self {
         let (streams, mut waiting) = mpsc::unbounded_channel::<DuplexStream>();
-        let mut device = device(stage);
+        let mut device = device(stage, OWN_BOOT);
         let wire = wire(stage, baud);
         tokio::spawn(async move {
             let boot = Instant::now();
@@ -54,8 +55,8 @@ impl SimulatedDevice {
     }
 }
 
-fn device(stage: &Stage) -> Device<sim::SimulatedBoard> {
-    Device::new(sim::SimulatedBoard::new(Arc::clone(&stage.compiled), FIRST_BOOT))
+fn device(stage: &Stage, boot: u32) -> Device<sim::SimulatedBoard> {
+    Device::new(sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot))
 }
 
 fn wire(stage: &Stage, baud: u32) -> sim::Wire {
@@ -93,7 +94,8 @@ async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
     let shown = args.pty.as_deref().unwrap_or(pty.path());
     say(&format!("{}\n", shown.display()))?;
     note(&format!("simulated rig at {baud} baud; Ctrl-C switches it off"));
-    let mut device = device(stage);
+    // Whoever drove the one before must see that this is another boot: its clock began anew.
+    let mut device = device(stage, draw_session());
     tokio::select! {
         biased;
         () = stop.next() => Ok(ExitCode::SUCCESS),
