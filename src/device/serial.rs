@@ -28,7 +28,7 @@ pub struct SerialSettings {
 pub enum SerialError {
     /// Somebody has it open: a daemon, another terminal.
     #[error(
-        "{port}: in use by another program; close it, or drive the rig through the daemon that owns it"
+        "{port}: in use by another program; close it, or, where that is a daemon, hand it the plan with `gonio submit`"
     )]
     InUse {
         /// The port.
