@@ -136,8 +136,22 @@ pub(super) fn connect(path: &Path) -> Result<Connection, JournalError> {
     open(path, path, OpenFlags::SQLITE_OPEN_READ_WRITE)
 }
 
-/// Opens the file for reading, also where the medium or the folder is read-only.
+/// Opens the file for reading, also where the medium or the folder is read-only. Leaves nothing
+/// beside it: a journal without a log and without a writer's lock stands as it is, while a reader
+/// of another kind would make a log of its own, which only a writer may take away again.
 pub(super) fn connect_read_only(path: &Path) -> Result<Connection, JournalError> {
+    let immutable = || {
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
+        open(path, immutable_uri(path), flags)
+    };
+    let is_beside = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        Path::new(&name).exists()
+    };
+    if !is_beside("-wal") && !is_beside(".lock") {
+        return immutable();
+    }
     let connection = open(path, path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     let probe = connection.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(()));
     match probe {
@@ -147,8 +161,7 @@ pub(super) fn connect_read_only(path: &Path) -> Result<Connection, JournalError>
             if failure.code == rusqlite::ErrorCode::CannotOpen
                 || failure.code == rusqlite::ErrorCode::ReadOnly =>
         {
-            let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
-            open(path, immutable_uri(path), flags)
+            immutable()
         }
         _ => Ok(connection),
     }
