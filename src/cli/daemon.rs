@@ -9,6 +9,7 @@ use super::args::DaemonArgs;
 use super::client::default_address;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
+use super::output::note;
 use super::session::draw_session;
 use super::setup::{rig_at, stage_at};
 use super::shop::Shop;
@@ -76,10 +77,10 @@ async fn serve(config: &Config, shop: Shop, rig: &RigThread) -> Outcome {
     let daemon = Daemon::open(config, shop, rig.owner(), shutdown.clone())
         .await
         .map_err(|error| explain(&error, &config.data))?;
-    eprintln!("{name}{simulated}: listening at {}", daemon.address());
+    note(&format!("{name}{simulated}: listening at {}", daemon.address()));
     tokio::spawn(async move {
         signals.next().await;
-        eprintln!("bringing the axes to rest; once more stops at once");
+        note("bringing the axes to rest; once more stops at once");
         shutdown.gently.cancel();
         signals.next().await;
         shutdown.at_once.cancel();

@@ -10,6 +10,7 @@ use super::acquire::{Pace, acquire};
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::JOURNAL;
+use super::output::note;
 use super::run::{Ending, finish, first_job};
 use super::setup::Setup;
 use crate::journal::{Journal, Order, Reader};
@@ -22,7 +23,7 @@ pub(crate) fn resume(args: &ResumeArgs) -> Outcome {
     let journal = args.dir.join(JOURNAL);
     let (setup, left) = what_is_left(&journal)?;
     let Some(job) = job(&setup, &journal, &left, args.accept_drift, OnFault::Finish)? else {
-        eprintln!("{}: complete; nothing is left to measure", args.dir.display());
+        note(&format!("{}: complete; nothing is left to measure", args.dir.display()));
         return Ok(ExitCode::SUCCESS);
     };
     let pace = Pace::of(&setup, args.realtime);
