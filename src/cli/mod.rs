@@ -14,6 +14,7 @@ mod frontier;
 mod hand;
 mod inputs;
 mod nominal;
+mod outlook;
 mod output;
 mod plan;
 mod ports;

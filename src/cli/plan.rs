@@ -6,7 +6,8 @@ use serde_json::json;
 
 use super::args::PlanArgs;
 use super::failure::Outcome;
-use super::output::{say, say_json};
+use super::outlook::{outlook, warning};
+use super::output::{note, say, say_json};
 use super::setup::Setup;
 use super::text::{duration, table};
 use crate::plan::Prediction;
@@ -20,6 +21,9 @@ pub(crate) fn plan(args: &PlanArgs) -> Outcome {
         say_json(&as_json(&setup, prediction))?;
     } else {
         say(&as_text(&setup, prediction))?;
+    }
+    if let Some(warning) = warning(&setup) {
+        note(&warning);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -44,6 +48,13 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
         ("rig time", prediction.total_s()),
     ];
     rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
+    if let Some(Ok(outlook)) = outlook(setup) {
+        let (count, condition) = (outlook.coefficients, outlook.condition);
+        rows.push(row(
+            "fit",
+            format!("{count} coefficients, all determined (condition {condition:.1})"),
+        ));
+    }
     table(&rows)
 }
 
@@ -52,6 +63,14 @@ fn row(name: &str, value: String) -> Vec<String> {
 }
 
 fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
+    let fit = match outlook(setup) {
+        Some(Ok(outlook)) => json!({
+            "determined": true, "coefficients": outlook.coefficients,
+            "condition": outlook.condition,
+        }),
+        Some(Err(error)) => json!({"determined": false, "why": error.to_string()}),
+        None => serde_json::Value::Null,
+    };
     let [theta, phi, x, y] = prediction.travel;
     json!({
         "plan": setup.plan_name,
@@ -64,6 +83,7 @@ fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
             "theta_deg": theta.to_degrees(), "phi_deg": phi.to_degrees(),
             "x_mm": x * 1e3, "y_mm": y * 1e3,
         },
+        "fit": fit,
         "time_s": {
             "homing": prediction.homing_s,
             "moving": prediction.moving_s,

@@ -154,12 +154,14 @@ pub(crate) fn targets_planned(setup: &Setup) -> usize {
     setup.sequence.targets.len() * setup.plan.repeat as usize
 }
 
-fn fit_region(setup: &Setup) -> Region {
+/// What the plan's fit stands for.
+pub(crate) fn fit_region(setup: &Setup) -> Region {
     let region = setup.region();
     Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad }
 }
 
-fn basis(spec: FitSpec) -> BasisSpec {
+/// The plan's basis as the fit takes it.
+pub(crate) fn basis(spec: FitSpec) -> BasisSpec {
     BasisSpec { angular_degree: spec.angular_degree, position_degree: spec.position_degree }
 }
 

@@ -7,7 +7,8 @@ use super::acquire::{Acquired, Pace, acquire, exit_code};
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{create, default_folder};
-use super::output::{say, say_json};
+use super::outlook::warning;
+use super::output::{note, say, say_json};
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::summary::Summary;
@@ -28,6 +29,9 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
     let setup = Setup::from_disk(&args.plan, &args.rig)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&setup.plan_name));
     refuse_existing(&folder)?;
+    if let Some(warning) = warning(&setup) {
+        note(&warning);
+    }
     let pace = Pace::of(&setup, args.realtime);
     let acquired = acquire(&setup, pace, || {
         let (journal, _) = create(&folder, &setup)?;
