@@ -16,5 +16,7 @@ pub mod throughput;
 
 mod domain;
 mod error_free;
+mod estimate;
 
 pub use domain::DomainError;
+pub use estimate::{Estimate, EstimateError, Tolerance};

@@ -1,9 +1,20 @@
-//! Integration by nodes and weights, and sums that keep their digits. It doesn't know the integrand.
+//! Integration: fixed nodes and weights, adaptive rules in one and two dimensions, quasi-Monte Carlo in
+//! more, and sums that keep their digits. It doesn't know the integrand.
 
 use core::f64::consts::PI;
 
 use crate::domain::{DomainError, within};
-use crate::error_free::{DoubleDouble, two_sum};
+use crate::error_free::DoubleDouble;
+
+mod adaptive;
+mod cubature;
+mod quasi_monte_carlo;
+mod sum;
+
+pub use adaptive::{adaptive, adaptive_between};
+pub use cubature::{Cell, cubature};
+pub use quasi_monte_carlo::{Sobol, quasi_monte_carlo};
+pub use sum::Sum;
 
 /// Nodes in (-1, 1), rising, and weights, of the Gauss-Legendre rule with `n` nodes: exact for
 /// polynomials of degree 2n-1; the weights sum to 2. Both within an ulp or two of the true ones:
@@ -103,50 +114,4 @@ pub fn cone(theta_max_rad: f64, rings: usize, spokes: usize) -> Result<Vec<ConeN
         }));
     }
     Ok(nodes)
-}
-
-/// A running sum that carries what rounding drops (Neumaier 1974): the error of the sum stays a
-/// rounding or two, however many terms and whatever their order.
-///
-/// ```
-/// let sum: radiometry::quadrature::Sum = [1e16, 1.0, -1e16].into_iter().collect();
-/// assert_eq!(sum.value(), 1.0);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sum {
-    rounded: f64,
-    rest: f64,
-}
-
-impl Sum {
-    /// One more term.
-    pub fn add(&mut self, term: f64) {
-        let (rounded, rest) = two_sum(self.rounded, term);
-        self.rounded = rounded;
-        // Once the sum is infinite the exact rest is NaN: the infinity is the answer.
-        if rest.is_finite() {
-            self.rest += rest;
-        }
-    }
-
-    /// The sum so far.
-    pub fn value(self) -> f64 {
-        self.rounded + self.rest
-    }
-}
-
-impl Extend<f64> for Sum {
-    fn extend<I: IntoIterator<Item = f64>>(&mut self, terms: I) {
-        for term in terms {
-            self.add(term);
-        }
-    }
-}
-
-impl FromIterator<f64> for Sum {
-    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
-        let mut sum = Self::default();
-        sum.extend(terms);
-        sum
-    }
 }
