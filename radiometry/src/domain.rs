@@ -43,6 +43,45 @@ pub enum DomainError {
         /// The interval's upper end, included.
         high: f64,
     },
+    /// A direction that has no length.
+    ZeroVector {
+        /// The argument.
+        argument: &'static str,
+    },
+    /// The receiver lies on the surface that it looks at: what it sees depends on the side from
+    /// which it came there.
+    Touching {
+        /// What it lies on.
+        shape: &'static str,
+    },
+    /// The receiver is within a body.
+    Inside {
+        /// Which body.
+        shape: &'static str,
+        /// From the body's centre to the receiver.
+        distance_m: f64,
+        /// The body's radius.
+        radius_m: f64,
+    },
+    /// A polygon of fewer than three distinct vertices.
+    TooFewVertices {
+        /// How many distinct ones there are.
+        distinct: usize,
+    },
+    /// A polygon whose vertices are in no plane.
+    NotPlanar {
+        /// The vertex farthest from the mean plane, counted from 0.
+        vertex: usize,
+        /// Its distance from that plane.
+        off_plane_m: f64,
+    },
+    /// A polygon two of whose edges cross.
+    SelfIntersecting {
+        /// One edge, by its first vertex, counted from 0.
+        edge: usize,
+        /// The other.
+        other: usize,
+    },
 }
 
 impl fmt::Display for DomainError {
@@ -61,6 +100,30 @@ impl fmt::Display for DomainError {
             Self::Outside { argument, value, low, high } => {
                 write!(f, "{argument} is {value}, expected {low} to {high}")
             }
+            Self::ZeroVector { argument } => {
+                write!(f, "{argument} has length 0, expected a direction")
+            }
+            Self::Touching { shape } => {
+                write!(f, "the receiver lies on the {shape}, expected a point off it")
+            }
+            Self::Inside { shape, distance_m, radius_m } => write!(
+                f,
+                "the receiver is {distance_m} m from the centre of the {shape} of radius \
+                 {radius_m} m, expected a point outside"
+            ),
+            Self::TooFewVertices { distinct } => {
+                write!(f, "the polygon has {distinct} distinct vertices, expected 3 or more")
+            }
+            Self::NotPlanar { vertex, off_plane_m } => write!(
+                f,
+                "vertex {vertex} is {off_plane_m} m off the polygon's plane, expected vertices in \
+                 one plane"
+            ),
+            Self::SelfIntersecting { edge, other } => write!(
+                f,
+                "the edges from vertex {edge} and from vertex {other} cross, expected a simple \
+                 polygon"
+            ),
         }
     }
 }
@@ -97,4 +160,29 @@ pub(crate) fn within(
     } else {
         Err(DomainError::Outside { argument, value, low, high })
     }
+}
+
+/// The vector, if its components are finite numbers.
+pub(crate) fn finite_vector(
+    argument: &'static str,
+    vector: glam::DVec3,
+) -> Result<glam::DVec3, DomainError> {
+    for value in vector.to_array() {
+        finite(argument, value)?;
+    }
+    Ok(vector)
+}
+
+/// The vector's direction, scaled by a power of two to a largest component in [1, 2): no digit
+/// changes, and neither its squares nor its products can overflow.
+pub(crate) fn direction(
+    argument: &'static str,
+    vector: glam::DVec3,
+) -> Result<glam::DVec3, DomainError> {
+    let vector = finite_vector(argument, vector)?;
+    if vector == glam::DVec3::ZERO {
+        return Err(DomainError::ZeroVector { argument });
+    }
+    let exponent = -libm::ilogb(vector.abs().max_element());
+    Ok(glam::DVec3::from_array(vector.to_array().map(|value| libm::scalbn(value, exponent))))
 }

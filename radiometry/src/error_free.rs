@@ -38,6 +38,12 @@ impl DoubleDouble {
         Self { high: value, low: 0.0 }
     }
 
+    /// a - b without loss.
+    pub(crate) fn difference(a: f64, b: f64) -> Self {
+        let (high, low) = two_sum(a, -b);
+        Self { high, low }
+    }
+
     /// Rounded to the nearest double.
     pub(crate) fn to_f64(self) -> f64 {
         self.high + self.low
@@ -51,12 +57,16 @@ impl DoubleDouble {
     }
 
     pub(crate) fn sub(self, other: Self) -> Self {
-        self.add(Self { high: -other.high, low: -other.low })
+        self.add(other.neg())
     }
 
     pub(crate) fn mul(self, other: Self) -> Self {
         let (high, rest) = two_product(self.high, other.high);
         Self::renormalised(high, rest + self.high.mul_add(other.low, self.low * other.high))
+    }
+
+    pub(crate) fn neg(self) -> Self {
+        Self { high: -self.high, low: -self.low }
     }
 
     pub(crate) fn div(self, other: Self) -> Self {
@@ -66,6 +76,21 @@ impl DoubleDouble {
         let rest = rest.sub(other.mul(Self::from_f64(second)));
         let (high, low) = two_sum(first, second);
         Self::renormalised(high, low + rest.high / other.high)
+    }
+
+    /// The square root of a number not below zero: one Newton step from the double's root.
+    pub(crate) fn sqrt(self) -> Self {
+        let root = self.high.sqrt();
+        if root == 0.0 {
+            return Self::from_f64(0.0);
+        }
+        let rest = self.sub(Self::from_f64(root).mul(Self::from_f64(root)));
+        Self::renormalised(root, rest.to_f64() / (2.0 * root))
+    }
+
+    /// Times two to the power, exactly.
+    pub(crate) fn scaled(self, exponent: i32) -> Self {
+        Self { high: libm::scalbn(self.high, exponent), low: libm::scalbn(self.low, exponent) }
     }
 
     fn renormalised(high: f64, low: f64) -> Self {

@@ -11,12 +11,14 @@ pub mod basis;
 pub mod direction;
 pub mod quadrature;
 pub mod quantity;
+pub mod shape;
 pub mod solid_angle;
 pub mod throughput;
 
 mod domain;
 mod error_free;
 mod estimate;
+mod wide;
 
 pub use domain::DomainError;
 pub use estimate::{Estimate, EstimateError, Tolerance};

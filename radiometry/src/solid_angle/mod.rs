@@ -1,11 +1,15 @@
-//! Solid angle and projected solid angle of cones, rings and disks on the axis. Written without the
-//! difference 1 - cos, which has no digits left for small cones. (Projected: about the receiver's
-//! normal; what lies below its horizon is cut off.)
+//! Solid angle of cones, rings, disks, spheres, triangles and polygons, and the projected solid angle
+//! of a cone about the receiver's normal. Written without the difference 1 - cos, which has no digits
+//! left for small cones. Orientation of the receiver beyond that is the room next door, `projected`.
+
+mod triangle;
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use crate::domain::{DomainError, not_negative, within};
 use crate::quantity::{ProjectedSolidAngle, SolidAngle};
+
+pub use triangle::{polygon, triangle, triangle_signed};
 
 /// The largest solid angle: 4π sr.
 const WHOLE_SPHERE: f64 = 4.0 * PI;
@@ -87,6 +91,30 @@ pub fn disk(radius_m: f64, distance_m: f64) -> Result<SolidAngle, DomainError> {
     let (radius, distance) = (radius / 4.0, distance / 4.0);
     let slant = libm::hypot(radius, distance);
     Ok(SolidAngle::from_sr(2.0 * PI * (radius / slant) * (radius / (slant + distance))))
+}
+
+/// Solid angle of a sphere from a point at `distance_m` from its centre, on its surface or outside:
+/// 4π sin²(σ/2) = 2π (r/d)²/(1 + cos σ) with cos σ = √((d-r)(d+r))/d. 2π on the surface; from inside,
+/// which is refused, it would be all directions.
+///
+/// ```
+/// use radiometry::solid_angle::sphere;
+/// // 2π (1 - cos σ) with the sides 3, 4 and 5.
+/// assert!((sphere(3.0, 5.0)?.sr() - 0.4 * std::f64::consts::PI).abs() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
+pub fn sphere(radius_m: f64, distance_m: f64) -> Result<SolidAngle, DomainError> {
+    let radius = not_negative("radius_m", radius_m)?;
+    let distance = not_negative("distance_m", distance_m)?;
+    if radius == 0.0 {
+        return Ok(SolidAngle::ZERO);
+    }
+    if distance < radius {
+        return Err(DomainError::Inside { shape: "sphere", distance_m, radius_m });
+    }
+    let sin = radius / distance;
+    let cos = ((distance - radius) / distance * (1.0 + sin)).sqrt();
+    Ok(SolidAngle::from_sr(2.0 * PI * sin * (sin / (1.0 + cos))))
 }
 
 #[cfg(test)]
