@@ -9,6 +9,7 @@
 
 pub mod basis;
 pub mod direction;
+pub mod projected;
 pub mod quadrature;
 pub mod quantity;
 pub mod shape;

@@ -1,0 +1,52 @@
+//! Projected solid angle ∫ cos θ dω of disks, spheres and polygons in any position, as seen by a
+//! receiver with a normal: the irradiance per radiance of a uniform source. What lies below the
+//! receiver's horizon is cut off. Both faces of a flat source emit.
+//!
+//! Closed forms where they keep their digits; where they cancel, the same positive integrand by Gauss
+//! quadrature. It knows no radiance and no rig.
+
+mod disk;
+mod polygon;
+mod smooth;
+mod sphere;
+
+use core::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::domain::{DomainError, direction, finite_vector};
+use crate::quantity::ProjectedSolidAngle;
+
+pub use disk::{disk, disk_parallel, disk_tilted};
+pub use polygon::polygon;
+pub use sphere::{sphere, sphere_tilted};
+
+/// A point with the normal of the surface that it belongs to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Receiver {
+    point_m: DVec3,
+    normal: DVec3,
+}
+
+impl Receiver {
+    /// The normal may have any length but 0.
+    pub fn new(point_m: DVec3, normal: DVec3) -> Result<Self, DomainError> {
+        Ok(Self { point_m: finite_vector("point", point_m)?, normal: direction("normal", normal)? })
+    }
+
+    /// Where it is.
+    pub fn point_m(&self) -> DVec3 {
+        self.point_m
+    }
+
+    /// Along its normal; the length means nothing.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+}
+
+/// No more than the hemisphere: the kernels' last rounding may lie beyond it, nothing else.
+fn of_hemisphere(sr: f64) -> ProjectedSolidAngle {
+    debug_assert!((-1e-9..PI + 1e-9).contains(&sr), "{sr} sr");
+    ProjectedSolidAngle::from_sr(sr.clamp(0.0, PI))
+}
