@@ -72,12 +72,18 @@ impl Prediction {
         self.homing_s + self.moving_s + self.settling_s + self.dwelling_s + self.checking_s
     }
 
+    /// Finding all home marks: see [`Prediction::homing_s`].
+    pub fn homing_s_of(rig: &Rig) -> f64 {
+        let sweep = |axis: &crate::rig::Axis| (axis.travel.1 - axis.travel.0) / axis.speed;
+        rig.axes.iter().map(sweep).fold(0.0, f64::max) / HOMING_SPEED
+    }
+
     /// Of steps that begin at home.
     pub(super) fn of(rig: &Rig, targets: &[Target], steps: &[Step]) -> Self {
         let mut prediction = Self {
             targets: count(targets.len()),
             readings: count(steps.len()),
-            homing_s: homing_s(rig),
+            homing_s: Self::homing_s_of(rig),
             ..Self::default()
         };
         let mut here = Latched([0; 4]);
@@ -103,11 +109,6 @@ impl Prediction {
             self.travel[i] += axis.position(counts);
         }
     }
-}
-
-fn homing_s(rig: &Rig) -> f64 {
-    let sweep = |axis: &crate::rig::Axis| (axis.travel.1 - axis.travel.0) / axis.speed;
-    rig.axes.iter().map(sweep).fold(0.0, f64::max) / HOMING_SPEED
 }
 
 /// Both counts are bounded when a sequence is laid out.

@@ -233,7 +233,9 @@ fn read_reference(
 }
 
 /// `[warm_up]`: reference readings until they stay within `tolerance_relative` (highest less
-/// lowest over their mean) for `over_s`; given up after `timeout_s`.
+/// lowest over their mean) for `over_s`; given up after `timeout_s`. They are compared as counts,
+/// before any dark level is known: the dark current is part of their mean, and their noise part
+/// of the spread.
 fn read_warm_up(table: Table<'_>) -> Result<WarmUp, Problem> {
     let seconds = |key: &str| table.required_number(key, SECONDS).map(Duration::from_secs_f64);
     let warm_up = WarmUp {
@@ -253,8 +255,17 @@ fn read_warm_up(table: Table<'_>) -> Result<WarmUp, Problem> {
     Ok(warm_up)
 }
 
-/// `[stop]`: `exitance_relative`, once the exitance's relative standard uncertainty is that small;
-/// `rig_time_s_max`, once the rig has worked that long.
+/// `[stop]`: rules that end the run before its last target. Either way the last dark and reference
+/// readings are still taken.
+///
+/// `exitance_relative`: once the exitance's combined standard uncertainty (k = 1), what all
+/// readings share included, is at most this part of it, by a fit of what there is. It is looked at
+/// from two targets a coefficient of the fit on, and again whenever there are a tenth more. A run
+/// that ends without it has missed its accuracy target. What was measured by then should cover
+/// the region: a low-discrepancy schedule as listed, or repeats, rather than one round of a grid.
+///
+/// `rig_time_s_max`: so that the run ends within this rig time, homing and warming up included;
+/// time at a standstill, paused or faulted, doesn't count.
 fn read_stop(table: Table<'_>) -> Result<Stop, Problem> {
     let stop = Stop {
         exitance_relative: table.number("exitance_relative", RELATIVE)?,

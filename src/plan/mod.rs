@@ -24,7 +24,7 @@ mod tree;
 
 pub use cost::{Prediction, StepTime, TimeLeft};
 pub use hash::PlanHash;
-pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Target, WARM_UP_IDS_FROM};
+pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Target, WARM_UP_IDS_FROM, closing};
 pub use terms::{
     Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, WarmUp,
 };

@@ -79,3 +79,10 @@ impl Sequence {
         Step { id: RESUME_IDS_FROM.saturating_add(n), ..self.reference }
     }
 }
+
+/// The readings with which steps in order close, after the last target: of the reference pose and
+/// of the dark. All of them if there is no target.
+pub fn closing(steps: &[Step]) -> &[Step] {
+    let is_target = |step: &Step| matches!(step.kind, ReadingKind::Target { .. });
+    &steps[steps.iter().rposition(is_target).map_or(0, |last| last + 1)..]
+}

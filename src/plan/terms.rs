@@ -133,7 +133,8 @@ pub struct Reference {
 /// Waiting until the source is stable, at the reference pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WarmUp {
-    /// The readings' spread, highest less lowest over their mean, that counts as stable.
+    /// The readings' spread, highest less lowest over their mean, that counts as stable; of raw
+    /// counts, dark included.
     pub tolerance_relative: f64,
     /// Over this time.
     pub over: Duration,
@@ -144,9 +145,9 @@ pub struct WarmUp {
 /// When to stop before all targets are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stop {
-    /// Once the exitance's relative standard uncertainty is no more than this.
+    /// Once the exitance's combined relative standard uncertainty is no more than this.
     pub exitance_relative: Option<f64>,
-    /// Once the rig has worked this long.
+    /// So that the rig has worked no longer than this.
     pub rig_time_max: Option<Duration>,
 }
 

@@ -34,13 +34,14 @@ impl RunClock {
         at
     }
 
+    /// The time when nobody has heard of a tick: it goes on by the host's clock since the last one.
+    pub(super) fn now(&self, now: Instant) -> i64 {
+        self.last.map_or(0, |(_, micros, heard)| micros + elapsed_us(heard, now))
+    }
+
     /// The device's clock began anew, and reads `tick` now: time goes on by the host's clock.
     pub(super) fn restart(&mut self, tick: Tick, now: Instant) {
-        let at = match self.last {
-            Some((_, micros, heard)) => micros + elapsed_us(heard, now),
-            None => 0,
-        };
-        self.last = Some((tick, at, now));
+        self.last = Some((tick, self.now(now), now));
     }
 }
 
@@ -64,6 +65,15 @@ mod tests {
         assert_eq!(clock.micros(Tick(1500), at(4000)), 1000);
         assert_eq!(clock.micros(Tick(1400), at(4000)), 900);
         assert_eq!(clock.micros(Tick(2500), at(5000)), 2000);
+    }
+
+    #[test]
+    fn between_two_ticks_the_hosts_clock_goes_on() {
+        let mut clock = RunClock::default();
+        assert_eq!(clock.now(at(9000)), 0);
+        clock.micros(Tick(500), at(0));
+        clock.micros(Tick(1500), at(1200));
+        assert_eq!(clock.now(at(3200)), 3000);
     }
 
     #[test]

@@ -4,28 +4,34 @@
 //! device, the journal.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use firmware_protocol::{CommandId, Identity, Instant, Reply, RequestType, Status};
 use tokio::sync::{mpsc, watch};
 
 use super::clock::RunClock;
+use super::course::Course;
 use super::desk::{Desk, Order};
 use super::events::{Happening, Progress};
 use super::hardware::{Hardware, ReachError};
 use super::job::{Check, Ended, Job};
 use super::machine::{Action, Connected, Input, Machine, Program, Setup, Taken, Wish};
-use super::pace::Pace;
 use super::reading::{Taking, reading};
+use super::rule::Watch;
 use super::state::{Fault, Outcome, Position, State};
 use crate::device::{DeviceEvent, LinkLost};
 use crate::journal::{self, EventKind, JournalError, Record, Writer};
 use crate::plan::RESUME_IDS_FROM;
 use crate::rig::Reading;
 
+/// How often progress is told while the axes move or the detector integrates.
+const PROGRESS_EVERY: Duration = Duration::from_secs(1);
+
 enum Woken {
     Order(Option<Order>),
     TimedOut,
     Device(DeviceEvent),
+    Rule(String),
     Journal,
 }
 
@@ -41,8 +47,7 @@ pub(super) struct Engine<'a> {
     lost: Option<JournalError>,
     unreached: Option<ReachError>,
     clock: RunClock,
-    pace: Pace,
-    progress: Progress,
+    course: Course,
     // Frames sent again, for commands that needed it.
     retries: BTreeMap<CommandId, u32>,
     origin: tokio::time::Instant,
@@ -51,7 +56,8 @@ pub(super) struct Engine<'a> {
     wants_link: bool,
     session: u32,
     session_began_s: f64,
-    rig_s_max: f64,
+    rule: Option<Watch>,
+    tell_at: tokio::time::Instant,
 }
 
 impl<'a> Engine<'a> {
@@ -62,14 +68,8 @@ impl<'a> Engine<'a> {
         job: Job,
         journal: Writer,
     ) -> Self {
-        let Job { steps, done_before, warm_up, mut check, session, session_began_s, .. } = job;
-        let pace = Pace::new(&hardware.rig, &steps);
-        let progress = Progress {
-            done: done_before,
-            total: done_before + steps.len(),
-            rig_s: session_began_s,
-            rest_s: pace.rest_s(),
-        };
+        let course = Course::new(&hardware.rig, &job);
+        let Job { steps, warm_up, mut check, session, session_began_s, rule, .. } = job;
         let setup =
             Setup { rig: hardware.rig.clone(), home_first: job.home_first, on_fault: job.on_fault };
         let checks = check.as_mut().map(|check| std::mem::take(&mut check.steps));
@@ -86,8 +86,7 @@ impl<'a> Engine<'a> {
             lost: None,
             unreached: None,
             clock: RunClock::default(),
-            pace,
-            progress,
+            course,
             retries: BTreeMap::new(),
             origin: tokio::time::Instant::now(),
             boot_id: None,
@@ -95,13 +94,14 @@ impl<'a> Engine<'a> {
             wants_link: true,
             session,
             session_began_s,
-            rig_s_max: job.rig_time_max.map_or(f64::INFINITY, |max| max.as_secs_f64()),
+            rule,
+            tell_at: tokio::time::Instant::now(),
         }
     }
 
     /// Runs to the end, whatever that is.
     pub(super) async fn run(mut self) -> Ended {
-        self.desk.begin(self.progress);
+        self.desk.begin(self.course.progress());
         loop {
             if std::mem::take(&mut self.wants_link) {
                 self.connect().await;
@@ -124,6 +124,9 @@ impl<'a> Engine<'a> {
     async fn wait(&mut self) -> Woken {
         let until = self.machine.poll_timeout();
         let until = until.map(|at| self.origin + at.since(Instant::ZERO));
+        let tell_at = self.machine.state().is_active().then_some(self.tell_at);
+        let until = until.into_iter().chain(tell_at).min();
+        let rule = self.rule.as_mut();
         let native = self.hardware.native.as_mut();
         tokio::select! {
             biased;
@@ -137,6 +140,12 @@ impl<'a> Engine<'a> {
                     None => std::future::pending().await,
                 }
             } => Woken::Device(event),
+            text = async {
+                match rule {
+                    Some(rule) => rule.verdict().await,
+                    None => std::future::pending().await,
+                }
+            } => Woken::Rule(text),
             Ok(()) = self.committed.changed() => Woken::Journal,
         }
     }
@@ -145,7 +154,13 @@ impl<'a> Engine<'a> {
         let now = self.now();
         match woken {
             Woken::Order(order) => self.obey(order),
-            Woken::TimedOut => self.machine.handle_timeout(now),
+            Woken::TimedOut => {
+                self.machine.handle_timeout(now);
+                if self.tell_at <= tokio::time::Instant::now() {
+                    self.tell_progress();
+                }
+            }
+            Woken::Rule(text) => self.conclude(text),
             Woken::Device(event) => self.hear(event),
             Woken::Journal => {
                 let failure = self.committed.borrow_and_update().failure.clone();
@@ -305,11 +320,12 @@ impl<'a> Engine<'a> {
             }
             _ => {}
         }
-        if !matches!(state, State::Moving | State::Settling | State::Dwelling) {
-            self.pace.interrupt();
-            self.tell_link();
-        }
+        self.course.became(state, self.now_s());
         self.desk.tell(Happening::State(state));
+        if !matches!(state, State::Moving | State::Settling | State::Dwelling) {
+            self.tell_link();
+            self.tell_progress();
+        }
         // Whoever stands still can wait for the disk.
         if matches!(state, State::Paused | State::Faulted)
             && let Err(error) = self.journal.flush().await
@@ -319,6 +335,7 @@ impl<'a> Engine<'a> {
     }
 
     fn position(&mut self, position: Position) {
+        self.course.trust(position.is_trusted(), self.now_s());
         if position.is_trusted() {
             self.note(EventKind::Homed, &position.to_string());
         } else {
@@ -343,24 +360,40 @@ impl<'a> Engine<'a> {
         self.retries.retain(|command, _| *command > id);
         let reading = reading(&self.hardware.rig, &step, &result, taking);
         self.record(Record::Reading(reading.clone()));
-        self.progress.rig_s = self.session_began_s + end_us as f64 * 1e-6;
+        let end_s = self.session_began_s + end_us as f64 * 1e-6;
         if step.id >= RESUME_IDS_FROM {
             self.checked.push(reading.clone());
         }
-        if step.id < crate::plan::WARM_UP_IDS_FROM {
-            self.progress.done += 1;
-            self.pace.step(&self.hardware.rig, &step, &reading, self.progress.rig_s);
-            self.progress.rest_s = self.pace.rest_s();
-        } else {
-            self.pace.interrupt();
-        }
+        self.course.take(&step, &reading, end_s);
+        let met = self.rule.as_mut().and_then(|rule| rule.show(&reading));
+        let is_late = self.course.is_late(reading.commanded, &self.machine.steps_ahead());
         self.desk.tell(Happening::Reading(Box::new(reading)));
-        self.desk.tell(Happening::Progress(self.progress));
-        if self.progress.rig_s >= self.rig_s_max {
-            self.rig_s_max = f64::INFINITY;
-            self.note(EventKind::Note, "the plan's rig time is used up");
-            self.machine.handle_request(now, Wish::Stop);
+        self.tell_progress();
+        if let Some(text) = met {
+            self.conclude(text);
+        } else if is_late {
+            let Progress { done, total, .. } = self.course.progress();
+            self.conclude(format!("the rig's time is used up after {done} of {total} readings"));
         }
+    }
+
+    /// A rule of the plan is met.
+    fn conclude(&mut self, rule: String) {
+        self.note(EventKind::Note, &format!("a rule of the plan is met: {rule}"));
+        self.course.conclude();
+        let now = self.now();
+        self.machine.conclude(now, rule);
+    }
+
+    /// Run time, seconds.
+    fn now_s(&self) -> f64 {
+        self.session_began_s + self.clock.now(self.now()) as f64 * 1e-6
+    }
+
+    fn tell_progress(&mut self) {
+        let progress = self.course.look(self.now_s());
+        self.tell_at = tokio::time::Instant::now() + PROGRESS_EVERY;
+        self.desk.tell(Happening::Progress(progress));
     }
 
     fn judge(&mut self) {
@@ -380,7 +413,7 @@ impl<'a> Engine<'a> {
     }
 
     fn note(&mut self, kind: EventKind, text: &str) {
-        let (session, time_s) = (self.session, self.progress.rig_s);
+        let (session, time_s) = (self.session, self.course.progress().rig_s);
         self.record(Record::Event(journal::Event { session, time_s, kind, text: text.to_owned() }));
     }
 
@@ -411,19 +444,15 @@ impl<'a> Engine<'a> {
     }
 
     async fn end(mut self, outcome: Outcome) -> Ended {
+        let Progress { done, total, rig_s, .. } = self.course.look(self.now_s());
         if self.boot_id.is_some() {
-            let reason = match &outcome {
-                Outcome::Faulted(fault) => format!("faulted: {fault}"),
-                other => other.name().to_owned(),
-            };
-            let (number, ended_s) = (self.session, self.progress.rig_s);
-            self.record(Record::SessionEnded { number, ended_s, reason });
+            let (number, reason) = (self.session, outcome.reason());
+            self.record(Record::SessionEnded { number, ended_s: rig_s, reason });
         }
         if self.lost.is_none() {
             self.lost = self.journal.flush().await.err();
         }
         self.desk.tell(Happening::Finished(outcome.clone()));
-        let Progress { done, total, rig_s, .. } = self.progress;
         let (journal, lost, unreached) = (self.journal, self.lost, self.unreached);
         Ended { outcome, done, total, rig_s, journal, lost, unreached }
     }

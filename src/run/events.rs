@@ -53,9 +53,11 @@ pub struct Progress {
     pub done: usize,
     /// Steps of the plan.
     pub total: usize,
-    /// Rig time so far, seconds: the end of the last reading on the run's clock.
+    /// Rig time so far, seconds, on the run's clock: homing and standstills included, and at the
+    /// end until the axes are at rest.
     pub rig_s: f64,
-    /// Rig time that is left, seconds: predicted, and scaled by how the prediction fared so far.
+    /// Rig time that is left, seconds, homing included where it is to come: predicted, and scaled
+    /// by how the prediction fared so far.
     pub rest_s: f64,
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::hardware::ReachError;
 use super::machine::OnFault;
+use super::rule::Watch;
 use super::state::Outcome;
 use crate::journal::{JournalError, ReferenceCheck, Writer};
 use crate::plan::{Step, WarmUp};
@@ -48,8 +49,11 @@ pub struct Job {
     pub home_first: bool,
     /// Whether anybody is there to say continue after a fault.
     pub on_fault: OnFault,
-    /// Come to rest once the run has taken that long.
+    /// Measure no further target where the run, closed as the plan closes it, would take longer
+    /// than that. Time at a standstill, paused or faulted, doesn't count.
     pub rig_time_max: Option<Duration>,
+    /// Measure no further target once this says so.
+    pub rule: Option<Watch>,
 }
 
 impl Job {
@@ -65,6 +69,7 @@ impl Job {
             home_first: true,
             on_fault,
             rig_time_max: None,
+            rule: None,
         }
     }
 }

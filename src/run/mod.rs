@@ -6,6 +6,7 @@
 
 mod channels;
 mod clock;
+mod course;
 mod desk;
 mod engine;
 mod events;
@@ -17,6 +18,7 @@ mod owner;
 mod pace;
 mod reading;
 pub mod resume;
+mod rule;
 mod state;
 mod warm_up;
 
@@ -27,4 +29,5 @@ pub use hardware::ReachError;
 pub use job::{Check, Ended, Job, Judge, Judgement};
 pub use machine::{Answer, OnFault, Source, Wish};
 pub use owner::{OwnerHandle, Running, StartError, own};
+pub use rule::{Rule, Watch};
 pub use state::{Doubt, Fault, LEGAL, Outcome, Position, State};

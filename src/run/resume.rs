@@ -6,6 +6,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::job::{Check, Judge, Judgement};
+use super::state::Outcome;
 use crate::journal::{self, Session, Verdict};
 use crate::plan::{RESUME_IDS_FROM, Sequence, Step, WARM_UP_IDS_FROM};
 use crate::rig::calibration::{CalibrationError, Reference, Sample, calibrate};
@@ -34,6 +35,8 @@ pub struct Remainder {
     pub session: u32,
     /// Run time at which it begins, seconds: where the last one ended.
     pub began_s: f64,
+    /// The plan's rule by which the run has ended: nothing is to be measured any more.
+    pub rule: Option<String>,
 }
 
 /// What the journal leaves to do.
@@ -51,6 +54,7 @@ pub fn remainder(steps: &[Step], readings: &[Reading], sessions: &[Session]) -> 
     let last_session = sessions.iter().map(|session| session.number);
     let last_session = last_session.chain(readings.iter().map(|reading| reading.session)).max();
     Remainder {
+        rule: rule_met(sessions),
         done: steps.len() - missing.len(),
         steps: missing,
         warm_ups: next(WARM_UP_IDS_FROM, RESUME_IDS_FROM - 1),
@@ -58,6 +62,13 @@ pub fn remainder(steps: &[Step], readings: &[Reading], sessions: &[Session]) -> 
         session: last_session.map_or(0, |last| last + 1),
         began_s: last_session_s.fold(last_reading_s, f64::max),
     }
+}
+
+/// The plan's rule by which the run ended, if it did.
+pub fn rule_met(sessions: &[Session]) -> Option<String> {
+    let last = sessions.iter().max_by_key(|session| session.number)?;
+    let (_, reason) = last.ended.as_ref()?;
+    Outcome::rule_in(reason).map(str::to_owned)
 }
 
 /// Run time at which a reading ended, seconds.

@@ -241,11 +241,16 @@ fn describe_rejection(rejection: Rejection, f: &mut fmt::Formatter<'_>) -> fmt::
     }
 }
 
+/// The name of [`Outcome::Reached`], which a resume looks for in the journal.
+const REACHED: &str = "reached";
+
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// Every step has its reading.
     Complete,
+    /// A rule of the plan was met, this one; it ended the run before its last target.
+    Reached(String),
     /// Somebody asked to stop at a safe point, and it did.
     Stopped,
     /// Somebody asked to stop at once, and it did.
@@ -259,10 +264,30 @@ impl Outcome {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Complete => "complete",
+            Self::Reached(_) => REACHED,
             Self::Stopped => "stopped",
             Self::Aborted => "aborted",
             Self::Faulted(_) => "faulted",
         }
+    }
+
+    /// Whether the run ended as its plan wants it to.
+    pub const fn is_as_planned(&self) -> bool {
+        matches!(self, Self::Complete | Self::Reached(_))
+    }
+
+    /// Why a session ended, for the journal.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Reached(rule) => format!("{REACHED}: {rule}"),
+            Self::Faulted(fault) => format!("{}: {fault}", self.name()),
+            other => other.name().to_owned(),
+        }
+    }
+
+    /// The rule by which a session ended that has this [`Outcome::reason`].
+    pub fn rule_in(reason: &str) -> Option<&str> {
+        reason.strip_prefix(REACHED)?.strip_prefix(": ")
     }
 }
 
@@ -284,6 +309,15 @@ mod tests {
         for state in State::ALL {
             assert!(!State::Done.may_become(state));
             assert_eq!(state.may_become(State::Done), state != State::Done);
+        }
+    }
+
+    #[test]
+    fn a_rule_that_ended_a_run_is_found_again_in_the_journal() {
+        let rule = "exitance to 0.5 % after 320 of 1000 targets";
+        assert_eq!(Outcome::rule_in(&Outcome::Reached(rule.into()).reason()), Some(rule));
+        for other in [Outcome::Complete, Outcome::Faulted(Fault::Restarted), Outcome::Stopped] {
+            assert_eq!(Outcome::rule_in(&other.reason()), None);
         }
     }
 

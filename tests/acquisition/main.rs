@@ -2,6 +2,7 @@
 
 mod bench;
 mod board;
+mod course;
 mod driver;
 mod engine;
 mod resume;

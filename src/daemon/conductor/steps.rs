@@ -120,13 +120,13 @@ impl<W: Workshop> Conductor<W> {
     async fn on_measured(&mut self, measured: Result<Outcome, String>) -> Result<(), JournalError> {
         match measured {
             _ if self.is_aborted => self.evaluate().await,
-            Ok(Outcome::Complete) if self.stopping.is_some() => {
+            Ok(Outcome::Complete | Outcome::Reached(_)) if self.stopping.is_some() => {
                 self.interrupt("the daemon was stopped before the results were written").await
             }
             Ok(Outcome::Aborted | Outcome::Stopped) if self.stopping.is_some() => {
                 self.interrupt("the daemon was stopped").await
             }
-            Ok(Outcome::Complete | Outcome::Stopped) => self.evaluate().await,
+            Ok(Outcome::Complete | Outcome::Reached(_) | Outcome::Stopped) => self.evaluate().await,
             Ok(Outcome::Aborted) => self.interrupt("stopped at once").await,
             Ok(Outcome::Faulted(fault)) => self.interrupt(&fault.to_string()).await,
             Err(why) => self.interrupt(&why).await,

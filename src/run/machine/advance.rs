@@ -9,6 +9,7 @@ use super::{
     Action, After, Fault, Index, Latch, Line, Machine, Next, OnFault, Outcome, Outstanding, Phase,
     Position, Source, State, What,
 };
+use crate::plan::Step;
 use crate::run::channels::{all_axes, micros, route, to_channels};
 
 impl Machine {
@@ -123,10 +124,19 @@ impl Machine {
                     self.work.begin_judging();
                     self.actions.push_back(Action::Judge);
                 }
-                Phase::Steps => self.finish(Outcome::Complete),
+                Phase::Steps => self.finish(self.ending.clone()),
                 Phase::Judging | Phase::WarmUp => {}
             }
         }
+    }
+
+    /// The steps that will be measured whatever is decided now, in order, and one more.
+    pub fn steps_ahead(&self) -> Vec<Step> {
+        let on_device = self.outstanding.iter().filter_map(|outstanding| match outstanding.what {
+            What::Dwell { index, .. } => Some(index),
+            What::Home | What::Move => None,
+        });
+        on_device.chain(self.work.next()).map(|index| *self.work.step(index)).collect()
     }
 
     fn dwells(&self) -> usize {

@@ -193,6 +193,8 @@ pub struct Machine {
     work: Work,
     state: State,
     position: Position,
+    // How the run ends when nothing is left to do.
+    ending: Outcome,
     // The boot in which this run saw the axes homed.
     homed_in: Option<u32>,
     boot_id: u32,
@@ -229,6 +231,7 @@ impl Machine {
             work: Work::new(program),
             state: State::Idle,
             position: Position::Untrusted(Doubt::NotHomed),
+            ending: Outcome::Complete,
             homed_in: None,
             boot_id: 0,
             window: 1,

@@ -71,10 +71,24 @@ impl Machine {
             Wish::ClearFault => self.leave_fault(Next::Pause),
             Wish::Continue => self.go_on(),
             Wish::Pause => self.pause(),
-            Wish::Stop => self.end_after_dwell(),
+            Wish::Stop => self.end_after_dwell(Outcome::Stopped),
         };
         self.advance(now);
         answer
+    }
+
+    /// A rule of the plan is met. What the device has in its queue is still measured, then what the
+    /// plan closes with; the run ends without having braked. Before its first step, and in a
+    /// fault, it ends at once.
+    pub fn conclude(&mut self, now: Instant, rule: String) {
+        if self.state == State::Done || self.ending != Outcome::Complete {
+            return;
+        }
+        self.ending = Outcome::Reached(rule);
+        if self.state == State::Faulted || !self.work.conclude() {
+            self.end_after_dwell(self.ending.clone());
+        }
+        self.advance(now);
     }
 
     fn pause(&mut self) -> Answer {
@@ -102,15 +116,15 @@ impl Machine {
         }
     }
 
-    fn end_after_dwell(&mut self) -> Answer {
+    fn end_after_dwell(&mut self, outcome: Outcome) -> Answer {
         match self.state {
-            State::Faulted | State::Paused => self.finish(Outcome::Stopped),
+            State::Faulted | State::Paused => self.finish(outcome),
             State::Stopping if matches!(self.after, After::Finish(_)) => {}
             State::Stopping => {
                 self.next = None;
-                self.after = After::Finish(Outcome::Stopped);
+                self.after = After::Finish(outcome);
             }
-            _ => self.wish = Some((After::Finish(Outcome::Stopped), self.running_dwell())),
+            _ => self.wish = Some((After::Finish(outcome), self.running_dwell())),
         }
         Answer::Ending
     }

@@ -164,6 +164,61 @@ fn a_dark_with_the_source_off_asks_and_waits() {
     assert_eq!(bench.outcome, Some(Outcome::Complete));
 }
 
+/// Twenty targets, then the reference pose and a dark reading.
+fn closed(source_off: bool) -> Program {
+    let mut program = plain(20);
+    program.steps.push(step(20, ReadingKind::Reference));
+    program.steps.push(Step { source_off, ..step(21, ReadingKind::Dark) });
+    program
+}
+
+#[test]
+fn a_rule_ends_the_targets_and_the_run_closes_without_a_stop() {
+    for source_off in [false, true] {
+        let mut bench = Bench::new(closed(source_off), OnFault::Finish);
+        bench.step_until(State::Dwelling);
+        bench.machine.conclude(NOW, "enough".into());
+        bench.machine.conclude(NOW, "and again".into());
+        bench.act();
+        bench.settle();
+        assert_eq!(bench.outcome, Some(Outcome::Reached("enough".into())));
+        let mut ids: Vec<_> = bench.taken.iter().map(|step| step.id).collect();
+        let closing: &[u32] = if source_off { &[20] } else { &[20, 21] };
+        let at = ids.len() - closing.len();
+        assert_eq!(ids.split_off(at), closing);
+        // Those that the device had in its queue, and no more.
+        assert!(ids.len() < 8 && ids.iter().copied().eq((0..20).take(ids.len())), "{ids:?}");
+        assert!(!bench.states.contains(&State::Stopping) && bench.asked.is_empty());
+    }
+}
+
+#[test]
+fn a_fault_after_a_rule_brings_no_target_back() {
+    let mut bench = Bench::new(closed(false), OnFault::Wait);
+    bench.step_until(State::Dwelling);
+    bench.machine.conclude(NOW, "enough".into());
+    bench.act();
+    bench.cut();
+    let had = bench.taken.len();
+    bench.wish(Wish::Continue);
+    bench.settle();
+    assert_eq!(bench.outcome, Some(Outcome::Reached("enough".into())));
+    let after: Vec<_> = bench.taken[had..].iter().map(|step| step.id).collect();
+    assert_eq!(after, [20, 21]);
+}
+
+#[test]
+fn a_rule_that_is_met_before_the_first_step_ends_the_run_at_rest() {
+    let check = step(RESUME_IDS_FROM, ReadingKind::Reference);
+    let mut bench = Bench::new(Program { checks: vec![check], ..closed(false) }, OnFault::Wait);
+    bench.step_until(State::Homing);
+    bench.machine.conclude(NOW, "no time".into());
+    bench.act();
+    bench.settle();
+    assert_eq!(bench.outcome, Some(Outcome::Reached("no time".into())));
+    assert!(bench.device.queue.is_empty() && bench.taken.is_empty());
+}
+
 #[test]
 fn a_full_queue_is_waited_for_and_voids_what_came_after() {
     let mut bench = Bench::new(plain(20), OnFault::Finish);

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use crate::plan::{RESUME_IDS_FROM, Step, WARM_UP_IDS_FROM, WarmUp};
+use crate::plan::{RESUME_IDS_FROM, Step, WARM_UP_IDS_FROM, WarmUp, closing};
 use crate::run::warm_up::{Gate, Stability};
 
 /// Dwells queued ahead while warming up: each verdict comes this many dwells late at most.
@@ -50,6 +50,10 @@ pub(super) struct Work {
     steps: VecDeque<Index>,
     gate: Option<(Gate, Step, u32)>,
     phase: Phase,
+    // The first of the steps with which the plan closes.
+    closing: Index,
+    // Only those are still wanted.
+    is_concluded: bool,
     done: usize,
     total: usize,
 }
@@ -58,6 +62,7 @@ impl Work {
     pub(super) fn new(program: Program) -> Self {
         let Program { warm_up, checks, steps } = program;
         let (first_step, total) = (checks.len(), steps.len());
+        let closing = Index(first_step + total - closing(&steps).len());
         let all: Vec<_> = checks.into_iter().chain(steps).map(|s| (s, false)).collect();
         let steps: VecDeque<_> = (first_step..all.len()).map(Index).collect();
         let checks: VecDeque<_> = (0..first_step).map(Index).collect();
@@ -69,6 +74,8 @@ impl Work {
             steps,
             gate,
             phase: Phase::WarmUp,
+            closing,
+            is_concluded: false,
             done: 0,
             total,
         };
@@ -106,6 +113,11 @@ impl Work {
         }
     }
 
+    /// The next step of this phase, whether or not it may be handed out.
+    pub(super) fn next(&self) -> Option<Index> {
+        self.todo.front().copied()
+    }
+
     /// Hands out the step that [`Work::peek`] showed.
     pub(super) fn take(&mut self) -> Option<Index> {
         self.todo.pop_front()
@@ -118,10 +130,26 @@ impl Work {
             let (step, recorded) = &self.all[index.0];
             // Warm-up readings that nobody waits for any more are not worth repeating.
             let is_stale = is_warm_up(step) && self.phase != Phase::WarmUp;
-            if !recorded && !is_stale {
+            if !recorded && !is_stale && self.is_wanted(index) {
                 self.todo.push_front(index);
             }
         }
+    }
+
+    /// Wants no more targets: what is left to hand out is what the plan closes with, without what
+    /// would need a person. False before the steps have begun.
+    pub(super) fn conclude(&mut self) -> bool {
+        if self.phase != Phase::Steps {
+            return false;
+        }
+        self.is_concluded = true;
+        let todo = std::mem::take(&mut self.todo);
+        self.todo = todo.into_iter().filter(|index| self.is_wanted(*index)).collect();
+        true
+    }
+
+    fn is_wanted(&self, index: Index) -> bool {
+        !self.is_concluded || (index >= self.closing && !self.step(index).source_off)
     }
 
     /// Notes that the reading was taken over; false if it had been before.
