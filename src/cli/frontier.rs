@@ -116,7 +116,7 @@ fn run_one(setup: &Setup, folder: &Path, rung: usize, seed: u64) -> Result<Front
     let folder = folder.join("runs").join(format!("rung{rung}-seed{seed}"));
     let acquired = acquire(&setup, Pace::Virtual, || {
         let (journal, _) = create(&folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish)))
+        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
     })?;
     let Acquired { rig_s, journal, .. } = acquired;
     let journal = journal.map_err(Failure::midway)?;

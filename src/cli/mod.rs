@@ -27,6 +27,7 @@ mod session;
 mod setup;
 mod shop;
 mod simulated;
+mod stopping;
 mod summary;
 mod text;
 

@@ -2,34 +2,46 @@
 //! once.
 
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::acquire::{Pace, acquire};
+use super::acquire::{Acquired, Pace, acquire};
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::JOURNAL;
 use super::output::note;
 use super::run::{Ending, finish, first_job};
 use super::setup::Setup;
+use super::stopping;
 use crate::journal::{Journal, Order, Reader};
 use crate::run::resume::{Remainder, check, remainder};
-use crate::run::{Job, OnFault};
+use crate::run::{self, Job, OnFault};
 
 /// Carries an interrupted run on.
 pub(crate) fn resume(args: &ResumeArgs) -> Outcome {
     let began = Instant::now();
     let journal = args.dir.join(JOURNAL);
     let (setup, left) = what_is_left(&journal)?;
-    let Some(job) = job(&setup, &journal, &left, args.accept_drift, OnFault::Finish)? else {
-        note(&format!("{}: complete; nothing is left to measure", args.dir.display()));
-        return Ok(ExitCode::SUCCESS);
-    };
     let pace = Pace::of(&setup, args.realtime);
-    let acquired = acquire(&setup, pace, || Ok((Journal::open(&journal)?, job)))?;
+    let job = job(&setup, &journal, &left, args.accept_drift, (OnFault::Finish, pace))?;
+    let acquired = match job {
+        Some(job) => acquire(&setup, pace, || Ok((Journal::open(&journal)?, job)))?,
+        None => nothing_left(&args.dir, Journal::open(&journal)?, &left),
+    };
     let ending = Ending { is_strict: args.strict, is_json: args.json };
     finish(&args.dir, &setup, acquired, began, ending)
+}
+
+/// A run that has all that it was to have, though perhaps not its results.
+fn nothing_left(folder: &Path, journal: Journal, left: &Remainder) -> Acquired {
+    let (why, outcome) = match &left.rule {
+        None => ("complete".to_owned(), run::Outcome::Complete),
+        Some(rule) => {
+            (format!("ended by its plan's rule: {rule}"), run::Outcome::Reached(rule.clone()))
+        }
+    };
+    note(&format!("{}: {why}; nothing is left to measure", folder.display()));
+    Acquired { outcome, rig_s: left.began_s, journal: Ok(journal) }
 }
 
 /// The run as its journal has it, and what of it is left.
@@ -58,14 +70,15 @@ pub(crate) fn job(
     journal: &Path,
     left: &Remainder,
     accepts_drift: bool,
-    on_fault: OnFault,
+    (on_fault, pace): (OnFault, Pace),
 ) -> Result<Option<Job>, Failure> {
-    if left.steps.is_empty() {
+    if left.steps.is_empty() || left.rule.is_some() {
         return Ok(None);
     }
     let before = Reader::open(journal)?.readings(Order::Taken)?;
     let rig = Arc::new(setup.rig.clone());
-    let mut job = first_job(setup, on_fault);
+    let mut job = first_job(setup, on_fault, pace)?;
+    job.rule = stopping::rule(setup, before.clone(), pace)?;
     job.check = Some(check(rig, &setup.sequence, left, before, accepts_drift));
     job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
     job.steps.clone_from(&left.steps);

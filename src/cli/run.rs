@@ -11,6 +11,7 @@ use super::outlook::warning;
 use super::output::{note, say, say_json};
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
+use super::stopping;
 use super::summary::Summary;
 use crate::journal::Order;
 use crate::plan::{DarkMethod, Plan};
@@ -35,18 +36,19 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
     let pace = Pace::of(&setup, args.realtime);
     let acquired = acquire(&setup, pace, || {
         let (journal, _) = create(&folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish)))
+        Ok((journal, first_job(&setup, OnFault::Finish, pace)?))
     })?;
     let ending = Ending { is_strict: args.strict, is_json: args.json };
     finish(&folder, &setup, acquired, began, ending)
 }
 
 /// A run from its beginning.
-pub(crate) fn first_job(setup: &Setup, on_fault: OnFault) -> Job {
+pub(crate) fn first_job(setup: &Setup, on_fault: OnFault, pace: Pace) -> Result<Job, Failure> {
     let mut job = Job::new(setup.sequence.steps.clone(), on_fault);
     job.warm_up = setup.plan.warm_up.map(|gate| (gate, setup.sequence.warm_up(0), 0));
     job.rig_time_max = setup.plan.stop.rig_time_max;
-    job
+    job.rule = stopping::rule(setup, Vec::new(), pace)?;
+    Ok(job)
 }
 
 fn refuse_existing(folder: &Path) -> Result<(), Failure> {
@@ -70,11 +72,11 @@ pub(crate) fn finish(
     let Acquired { outcome, rig_s, journal } = acquired;
     let journal = journal
         .map_err(|error| Failure::midway(format!("{error}\n  help: {}", resume_line(folder))))?;
-    let is_complete = outcome == run::Outcome::Complete;
+    let is_as_planned = outcome.is_as_planned();
     let readings = journal.reader().readings(Order::Taken)?;
     let results = match Results::of(setup, setup.plan.fit, &readings) {
         // Too little was measured to say anything.
-        Err(_) if !is_complete => return Err(interrupted(folder, &outcome)),
+        Err(_) if !is_as_planned => return Err(interrupted(folder, &outcome)),
         results => results?,
     };
     results.write(folder, setup, &journal.reader().header()?, &readings)?;
@@ -83,7 +85,7 @@ pub(crate) fn finish(
         folder,
         setup,
         results: &results,
-        outcome: outcome.name(),
+        outcome: &outcome,
         rig_s,
         wall_s: began.elapsed().as_secs_f64(),
     };
@@ -93,11 +95,16 @@ pub(crate) fn finish(
         say(&summary.text())?;
     }
     closed.map_err(Failure::midway)?;
-    if !is_complete {
+    if !is_as_planned {
         return Err(interrupted(folder, &outcome));
     }
+    if let Some(missed) = stopping::missed(setup, &results) {
+        return Err(Failure::midway(missed));
+    }
     let n_excluded = results.fitted.as_ref().map_or(usize::MAX, |fitted| fitted.n_excluded);
-    let is_whole = results.calibrated.samples.len() == targets_planned(setup) && n_excluded == 0;
+    let is_measured = outcome != run::Outcome::Complete
+        || results.calibrated.samples.len() == targets_planned(setup);
+    let is_whole = is_measured && n_excluded == 0;
     Ok(exit_code(is_whole && !(ending.is_strict && results.n_flagged() > 0)))
 }
 

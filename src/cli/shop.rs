@@ -5,6 +5,7 @@ use std::path::Path;
 
 use spanned_toml::{Document, Source};
 
+use super::acquire::Pace;
 use super::failure::Failure;
 use super::folder::{JOURNAL, create};
 use super::inputs::Bundle;
@@ -13,11 +14,13 @@ use super::resume::{self, what_is_left};
 use super::run::first_job;
 use super::session::utc_now;
 use super::setup::{Setup, Stage};
+use super::stopping;
 use super::text::with_uncertainty;
 use crate::daemon::{Checked, Finished, Prepared, Refusal, Workshop};
-use crate::journal::{Input, InputRole, Journal, JournalError, Writer};
+use crate::journal::{Input, InputRole, Journal, JournalError, Reader, Writer};
 use crate::rig::Rig;
 use crate::run::OnFault;
+use crate::run::resume::rule_met;
 
 /// The daemon's rig, and on a simulated one what stands on it.
 #[derive(Debug)]
@@ -162,15 +165,15 @@ impl Workshop for Shop {
                 // A daemon that was killed while it made the folder had measured nothing.
                 let _ = std::fs::remove_dir_all(folder);
                 let (journal, _) = create(folder, &setup).map_err(refuse)?;
-                (journal, first_job(&setup, OnFault::Wait))
+                (journal, first_job(&setup, OnFault::Wait, Pace::Real).map_err(refuse)?)
             }
             Err(error) => return Err(Refusal::new(error.to_string())),
             Ok(journal) => {
                 let (setup, left) = what_is_left(&path).map_err(refuse)?;
                 self.compare_run(&setup)?;
                 // A reference that has moved is a fault; to say continue once more accepts it.
-                let job =
-                    resume::job(&setup, &path, &left, false, OnFault::Wait).map_err(refuse)?;
+                let job = resume::job(&setup, &path, &left, false, (OnFault::Wait, Pace::Real));
+                let job = job.map_err(refuse)?;
                 match job {
                     None => return Ok(Prepared::Measured),
                     Some(job) => (journal, job),
@@ -200,9 +203,16 @@ impl Shop {
             }
             Err(error) => format!("no fit: {error}"),
         };
-        Ok(Finished {
-            is_complete: measured == planned,
-            summary: format!("{measured} of {planned} targets measured; {fit}"),
-        })
+        let rule = rule_met(&Reader::open(&folder.join(JOURNAL))?.sessions()?);
+        let missed = stopping::missed(&setup, &results);
+        let mut summary = format!("{measured} of {planned} targets measured; {fit}");
+        if let Some(rule) = &rule {
+            summary = format!("stopped by the plan's rule: {rule}; {summary}");
+        }
+        if let Some(missed) = &missed {
+            summary = format!("{summary}; {missed}");
+        }
+        let is_complete = (measured == planned || rule.is_some()) && missed.is_none();
+        Ok(Finished { is_complete, summary })
     }
 }

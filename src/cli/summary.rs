@@ -9,6 +9,7 @@ use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::text::{duration, percent, table, with_uncertainty};
 use crate::rig::calibration::Flag;
+use crate::run::Outcome;
 
 /// What a summary says beside the results.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +17,8 @@ pub(crate) struct Summary<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) setup: &'a Setup,
     pub(crate) results: &'a Results,
-    /// Why the run ended, in a word.
-    pub(crate) outcome: &'a str,
+    /// Why the run ended.
+    pub(crate) outcome: &'a Outcome,
     pub(crate) rig_s: f64,
     pub(crate) wall_s: f64,
 }
@@ -29,7 +30,7 @@ impl Summary<'_> {
         let simulated = if setup.rig.is_simulated() { " (simulated)" } else { "" };
         let (measured, planned) = self.targets();
         let mut rows = vec![
-            row("run", format!("{}{simulated}: {}", setup.plan_name, self.outcome)),
+            row("run", format!("{}{simulated}: {}", setup.plan_name, self.ending())),
             row("targets", format!("{measured} of {planned} measured")),
             row("time in rig", duration(self.rig_s)),
             row("time on the clock", duration(self.wall_s)),
@@ -97,7 +98,8 @@ impl Summary<'_> {
             "plan": setup.plan_name,
             "rig": setup.rig.name,
             "simulated": setup.rig.is_simulated(),
-            "outcome": self.outcome,
+            "outcome": self.outcome.name(),
+            "rule": self.rule(),
             "targets_measured": measured,
             "targets_planned": planned,
             "rig_s": self.rig_s,
@@ -124,6 +126,21 @@ impl Summary<'_> {
             Err(error) => object["fit_error"] = json!(error.to_string()),
         }
         object
+    }
+
+    /// The plan's rule that ended the run.
+    fn rule(&self) -> Option<&str> {
+        match self.outcome {
+            Outcome::Reached(rule) => Some(rule),
+            _ => None,
+        }
+    }
+
+    fn ending(&self) -> String {
+        match self.rule() {
+            Some(rule) => format!("stopped by the plan's rule: {rule}"),
+            None => self.outcome.name().to_owned(),
+        }
     }
 
     fn targets(&self) -> (usize, usize) {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::plan::{Plan, Schedule};
+use crate::plan::{Plan, Schedule, Stop};
 
 /// A rung of the ladder: how a plan's density and dwell are scaled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +61,8 @@ impl Rung {
             plan.fit.angular_degree = scaled_degree(plan.fit.angular_degree, finer);
         }
         plan.dwell = whole_micros(plan.dwell.mul_f64(self.dwell));
+        // What a rung is compared by is what its rules would have ended it by.
+        plan.stop = Stop::default();
         plan
     }
 

@@ -1,0 +1,119 @@
+//! The plan's accuracy target, `exitance_relative` of its `[stop]`: the rule that ends a run once
+//! it is met, and what is said of a run that missed it.
+
+use super::acquire::Pace;
+use super::failure::Failure;
+use super::results::{Results, basis, fit_region, targets_planned};
+use super::setup::Setup;
+use super::text::percent;
+use crate::rig::calibration::{Fitted, calibrate};
+use crate::rig::{Reading, ReadingKind, Rig};
+use crate::run::{Rule, Watch};
+
+/// A fit says something about its own misfit from this many samples a coefficient on.
+const SAMPLES_PER_COEFFICIENT: usize = 2;
+/// The fit is made anew whenever there are this much more targets: all fits together cost about
+/// eleven times the last one.
+const GROWTH: f64 = 1.1;
+
+/// The rule for a run that has these readings from earlier sessions; `None` if the plan has none.
+pub(crate) fn rule(
+    setup: &Setup,
+    before: Vec<Reading>,
+    pace: Pace,
+) -> Result<Option<Watch>, Failure> {
+    let Some(asked) = setup.plan.stop.exitance_relative else { return Ok(None) };
+    let mut target = Target::new(setup, asked, before);
+    let rule: Rule = Box::new(move |reading| target.look(reading));
+    match pace {
+        Pace::Virtual => Ok(Some(Watch::inline(rule))),
+        Pace::Real => Watch::threaded(rule)
+            .map(Some)
+            .map_err(|error| Failure::start(format!("a thread for the stop rule: {error}"))),
+    }
+}
+
+/// The exitance's combined uncertainty, as far as it is known.
+struct Target {
+    rig: Rig,
+    region: fit::Region,
+    basis: fit::BasisSpec,
+    asked: f64,
+    planned: usize,
+    readings: Vec<Reading>,
+    targets: usize,
+    next: usize,
+}
+
+impl Target {
+    fn new(setup: &Setup, asked: f64, before: Vec<Reading>) -> Self {
+        let basis = basis(setup.plan.fit);
+        let first = basis.len().saturating_mul(SAMPLES_PER_COEFFICIENT);
+        Self {
+            rig: setup.rig.clone(),
+            region: fit_region(setup),
+            basis,
+            asked,
+            planned: targets_planned(setup),
+            targets: before.iter().filter(|reading| is_target(reading)).count(),
+            readings: before,
+            next: first,
+        }
+    }
+
+    /// What the rule says when this reading is taken.
+    fn look(&mut self, reading: &Reading) -> Option<String> {
+        self.readings.push(reading.clone());
+        self.targets += usize::from(is_target(reading));
+        if !is_target(reading) || self.targets < self.next {
+            return None;
+        }
+        self.next = grown(self.targets);
+        let fitted = calibrate(&self.rig, &self.readings).ok()?.fit(&self.region, self.basis);
+        let u = u_relative(&fitted.ok()?);
+        (u <= self.asked).then(|| {
+            let (asked, targets, planned) = (percent(self.asked), self.targets, self.planned);
+            format!("exitance to {asked} after {targets} of {planned} targets")
+        })
+    }
+}
+
+fn is_target(reading: &Reading) -> bool {
+    matches!(reading.kind, ReadingKind::Target { .. })
+}
+
+fn grown(targets: usize) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // millions at most
+    let grown = libm::ceil(targets as f64 * GROWTH) as usize;
+    grown.max(targets + 1)
+}
+
+/// The exitance's combined relative standard uncertainty; infinite without any light.
+fn u_relative(fitted: &Fitted) -> f64 {
+    let exitance = fitted.fit.exitance();
+    if exitance.value > 0.0 { exitance.u / exitance.value } else { f64::INFINITY }
+}
+
+/// What there is to say about a run whose plan asks for an accuracy that it does not have.
+pub(crate) fn missed(setup: &Setup, results: &Results) -> Option<String> {
+    let asked = setup.plan.stop.exitance_relative?;
+    let Ok(fitted) = &results.fitted else {
+        return Some("the accuracy target was missed: there is no fit".to_owned());
+    };
+    let u = u_relative(fitted);
+    if u <= asked {
+        return None;
+    }
+    let asked = percent(asked);
+    let exitance = fitted.fit.exitance();
+    if !u.is_finite() {
+        return Some(format!("the accuracy target was missed: no light; expected {asked}"));
+    }
+    let shared = exitance.u.powi(2) - exitance.u_independent.powi(2);
+    let shared = percent(libm::sqrt(shared.max(0.0)) / exitance.value);
+    Some(format!(
+        "the accuracy target was missed: exitance to {}, expected {asked}\n  help: {shared} are \
+         shared by all targets (the detector, the dark level): more of them do not lessen that",
+        percent(u)
+    ))
+}
