@@ -155,7 +155,7 @@ async fn run_job(
                         });
                         lines.get_or_insert_with(lines_of_standard_input);
                     }
-                    line.show(&event.happening);
+                    line.show(&event.happening, owner.status().progress);
                 }
                 // The line shows the latest; what it missed is in the journal.
                 Err(RecvError::Lagged(_)) => {}

@@ -9,17 +9,17 @@ use super::output::note;
 use super::setup::Setup;
 use super::text::duration;
 use crate::rig::{Detector, Reading, ReadingKind, Rig};
-use crate::run::Happening;
+use crate::run::{Happening, Progress, State};
 
-/// A bar with the time that is left, the pose and the reading.
+/// A bar with the time that is left, and below it the pose and the reading.
 pub(crate) struct ProgressLine {
     bar: ProgressBar,
     rig: Rig,
     pace: Pace,
     /// Of each gain range, the last dark level, counts: good enough to look at.
     darks: Vec<f64>,
-    rest_s: f64,
-    rig_s: f64,
+    /// Predicted, of finding the home marks.
+    homing_s: f64,
 }
 
 impl ProgressLine {
@@ -31,11 +31,14 @@ impl ProgressLine {
             ProgressDrawTarget::hidden()
         };
         let bar = ProgressBar::with_draw_target(Some(setup.sequence.steps.len() as u64), target);
-        if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("{bar:24} {pos}/{len} {prefix}\n  {wide_msg}")
+        {
             bar.set_style(style);
         }
         let darks = vec![0.0; setup.rig.detector.gains.len()];
-        Self { bar, rig: setup.rig.clone(), pace, darks, rest_s: 0.0, rig_s: 0.0 }
+        let homing_s = setup.sequence.prediction.homing_s;
+        Self { bar, rig: setup.rig.clone(), pace, darks, homing_s }
     }
 
     /// A line of its own, above the bar, that stays.
@@ -43,19 +46,33 @@ impl ProgressLine {
         if self.bar.is_hidden() { note(text) } else { self.bar.println(text) }
     }
 
-    /// Shows what happened.
-    pub(crate) fn show(&mut self, happening: &Happening) {
+    /// Shows what happened, and how far that brought the run.
+    pub(crate) fn show(&mut self, happening: &Happening, progress: Progress) {
         match happening {
             Happening::Fault(fault) => self.say(&format!("fault: {fault}")),
             Happening::Finished(_) => self.bar.finish_and_clear(),
-            Happening::Progress(progress) => {
-                (self.rest_s, self.rig_s) = (progress.rest_s, progress.rig_s);
-                self.bar.set_length(progress.total as u64);
-                self.bar.set_position(progress.done as u64);
-            }
+            Happening::Progress(progress) => self.show_progress(*progress, 0.0),
             Happening::Reading(reading) => self.show_reading(reading),
+            Happening::State(State::Homing) => {
+                self.show_progress(progress, self.homing_s);
+                self.bar.set_message("looking for the home marks");
+            }
+            Happening::State(state @ (State::Stopping | State::Paused | State::Faulted)) => {
+                self.bar.set_message(state.name());
+            }
             _ => {}
         }
+    }
+
+    fn show_progress(&self, progress: Progress, before_s: f64) {
+        let Progress { done, total, rig_s, rest_s } = progress;
+        let rest_s = rest_s + before_s;
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+        self.bar.set_prefix(match self.pace {
+            Pace::Real => format!("{} left", duration(rest_s)),
+            Pace::Virtual => format!("rig {} of {}", duration(rig_s), duration(rig_s + rest_s)),
+        });
     }
 
     fn show_reading(&mut self, reading: &Reading) {
@@ -67,15 +84,9 @@ impl ProgressLine {
         if self.bar.is_hidden() {
             return;
         }
-        let left = match self.pace {
-            Pace::Real => format!("{} left", duration(self.rest_s)),
-            Pace::Virtual => {
-                format!("rig {} of {}", duration(self.rig_s), duration(self.rig_s + self.rest_s))
-            }
-        };
         let (_, pose) = self.rig.measured(reading);
         self.bar.set_message(format!(
-            "{left} · θ {:.2}° φ {:.2}° x {:.2} mm y {:.2} mm · {}",
+            "θ {:.2}° φ {:.2}° x {:.2} mm y {:.2} mm · {}",
             pose.theta_rad.to_degrees(),
             pose.phi_rad.to_degrees(),
             pose.x_m * 1e3,
