@@ -104,10 +104,10 @@ pub(crate) enum Command {
 /// Which rig, and which scene stands on a simulated one.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RigArgs {
-    /// The rig: a rig.toml, or `simulated` for the built-in one. Default: what the plan names.
+    /// The rig: a rig.toml, or `simulated` for the built-in one. Default: what a plan names.
     #[arg(long, value_name = "RIG")]
     pub(crate) rig: Option<PathBuf>,
-    /// What stands on a simulated rig. Default: what the plan names.
+    /// What stands on a simulated rig. Default: what a plan names.
     #[arg(long, value_name = "SCENE")]
     pub(crate) scene: Option<PathBuf>,
     /// The seed of everything random on a simulated rig; the same seed repeats the run.
@@ -167,20 +167,20 @@ pub(crate) struct FitArgs {
     /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg).
     #[arg(long, value_name = "FILE")]
     pub(crate) at: Option<PathBuf>,
-    /// For a CSV without a column of uncertainties: each one's, relative to the largest radiance.
+    /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all.
     #[arg(long, value_name = "U")]
     pub(crate) u_relative: Option<f64>,
-    /// Where to write fit.json. Default: the run's folder, or standard output for a CSV.
+    /// Where to write fit.json. Default: the run's folder; of a CSV it is not written.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Print one JSON document.
+    /// Print fit.json.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum ExportFormat {
-    /// samples.csv with its samples.meta.json.
+    /// The columns of samples.csv; beside a file FILE.csv its FILE.meta.json.
     Csv,
 }
 
@@ -309,7 +309,7 @@ pub(crate) struct ReadArgs {
 /// Where the daemon listens.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DaemonAddress {
-    /// The daemon: unix:PATH or ADDR:PORT. Default: gonio.sock in the user's runtime folder.
+    /// The daemon: unix:PATH or ADDR:PORT. Default: gonio.sock in $XDG_RUNTIME_DIR or gonio-data.
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) daemon: Option<String>,
 }

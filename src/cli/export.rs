@@ -11,13 +11,18 @@ use crate::export::{write_atomically, write_samples};
 
 /// Writes the samples to a file, or to standard output.
 pub(crate) fn export(args: &ExportArgs) -> Outcome {
-    let (setup, _, readings) = read_run(&args.dir)?;
+    let (setup, header, readings) = read_run(&args.dir)?;
     let results = Results::of(&setup, setup.plan.fit, &readings)?;
     let (quantity, samples) = (setup.rig.detector.quantity, &results.calibrated.samples);
     let ExportFormat::Csv = args.format;
     match args.output.as_deref().filter(|path| *path != Path::new("-")) {
-        Some(path) => write_atomically(path, |out| write_samples(out, quantity, samples))
-            .map_err(Failure::midway)?,
+        Some(path) => {
+            // The numbers don't say by themselves what they are, nor that they were simulated.
+            let meta = path.with_extension("meta.json");
+            write_atomically(path, |out| write_samples(out, quantity, samples))
+                .and_then(|()| results.write_meta(&meta, &setup, &header))
+                .map_err(Failure::midway)?;
+        }
         None => write_out(|out| write_samples(out, quantity, samples))?,
     }
     Ok(ExitCode::SUCCESS)

@@ -7,6 +7,7 @@ use std::path::Path;
 use fit::{BasisSpec, FitError, Region};
 
 use super::failure::Failure;
+use super::folder::JOURNAL;
 use super::setup::Setup;
 use crate::export::{
     AccuracyPoint, ExportError, FitFile, SamplesMeta, TruePeak, Truth, write_accuracy,
@@ -76,6 +77,26 @@ impl Results {
         write_atomically(&folder.join("samples.csv"), |out| {
             write_samples(out, quantity, &self.calibrated.samples)
         })?;
+        self.write_meta(&folder.join("samples.meta.json"), setup, header)?;
+        write_atomically(&folder.join("readings.csv"), |out| {
+            write_readings(out, &setup.rig, readings.iter().cloned())
+        })?;
+        write_atomically(&folder.join("accuracy.csv"), |out| {
+            write_accuracy(out, quantity, &self.accuracy)
+        })?;
+        if let Ok(fitted) = &self.fitted {
+            self.write_fit(&folder.join("fit.json"), setup, fitted)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what samples.csv can't say in columns.
+    pub(crate) fn write_meta(
+        &self,
+        path: &Path,
+        setup: &Setup,
+        header: &Header,
+    ) -> Result<(), ExportError> {
         let meta = SamplesMeta {
             rig: &setup.rig,
             calibrated: &self.calibrated,
@@ -88,17 +109,7 @@ impl Results {
             targets_planned: targets_planned(setup),
             effects: &header.effects,
         };
-        write_atomically(&folder.join("samples.meta.json"), |out| meta.write(out))?;
-        write_atomically(&folder.join("readings.csv"), |out| {
-            write_readings(out, &setup.rig, readings.iter().cloned())
-        })?;
-        write_atomically(&folder.join("accuracy.csv"), |out| {
-            write_accuracy(out, quantity, &self.accuracy)
-        })?;
-        if let Ok(fitted) = &self.fitted {
-            self.write_fit(&folder.join("fit.json"), setup, fitted)?;
-        }
-        Ok(())
+        write_atomically(path, |out| meta.write(out))
     }
 
     /// Writes fit.json.
@@ -141,7 +152,7 @@ pub(crate) fn write_inputs(folder: &Path, setup: &Setup) -> Result<(), ExportErr
 
 /// Reads a run's folder: what it is made of, how it began, and its readings so far.
 pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), Failure> {
-    let reader = Reader::open(&folder.join("run.sqlite"))?;
+    let reader = Reader::open(&folder.join(JOURNAL))?;
     let header = reader.header()?;
     let name = Some(header.plan_name.clone());
     let setup = Setup::from_inputs(reader.inputs()?, name, header.seed)?;
