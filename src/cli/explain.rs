@@ -10,7 +10,7 @@ use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs, beside};
 use super::output::{say, say_json};
 use super::setup::{rig_at, stage_at};
-use super::text::table;
+use super::text::{table, wrapped};
 use crate::journal::InputRole;
 use crate::plan::Plan;
 
@@ -57,27 +57,34 @@ pub(crate) fn explain(args: &ExplainArgs) -> Outcome {
         say_json(&json!({"rig": rig.name, "effects": rows, "notes": notes}))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let mut rows =
-        vec![["", "effect", "called for by", "bound", "how"].map(str::to_owned).to_vec()];
-    for row in effects {
-        let bound = row.bound.map_or_else(
-            || "-".to_owned(),
-            |bound| format!("{:.2e} {}", bound.value, bound.unit.symbol()).trim_end().to_owned(),
-        );
-        let mark = if row.included { "in" } else { "out" };
-        rows.push(vec![
-            mark.to_owned(),
-            row.name.clone(),
-            row.cause.clone(),
-            bound,
-            row.how.clone(),
-        ]);
-    }
-    let mut text = table(&rows);
+    let mut text = effects_text(effects);
     for note in notes {
         // Writing to a string does not fail.
         let _ = writeln!(text, "  note: {note}");
     }
     say(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Two paragraphs an effect: whether it is in, what it amounts to and what calls for it; and how
+/// it is done.
+fn effects_text(effects: &[sim::EffectRow]) -> String {
+    let rows: Vec<_> = effects
+        .iter()
+        .map(|row| {
+            let bound = row.bound.map_or_else(
+                || "-".to_owned(),
+                |bound| format!("{:.2e} {}", bound.value, bound.unit.symbol()),
+            );
+            let mark = if row.included { "in" } else { "out" };
+            vec![mark.to_owned(), row.name.clone(), bound]
+        })
+        .collect();
+    let mut text = String::new();
+    for (line, row) in table(&rows).lines().zip(effects) {
+        let _ = writeln!(text, "{line}");
+        text.push_str(&wrapped(&format!("because {}", row.cause), 7));
+        text.push_str(&wrapped(&row.how, 7));
+    }
+    text
 }

@@ -4,18 +4,18 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{BasisSpec, Fit, Region};
+use fit::{BasisSpec, Region};
 
 use super::args::FitArgs;
 use super::failure::{Failure, Outcome};
-use super::output::{say, write_out};
+use super::output::{note, say, write_out};
 use super::results::{Results, read_run};
-use super::text::{percent, table, with_uncertainty};
+use super::summary::field_rows;
+use super::text::{row, table};
 use crate::export::{
     FitFile, InputSamples, RayColumns, read_rays, read_samples, write_at, write_atomically,
 };
 use crate::plan::FitSpec;
-use crate::rig::Quantity;
 
 /// The degrees for a CSV, where the command line does not say.
 const ANGULAR_DEGREE: usize = 6;
@@ -70,7 +70,7 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         notes: &[],
         truth: results.truth,
     };
-    show(args, rays, &file)
+    show(args, rays, &file, Some(&path))
 }
 
 fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
@@ -104,7 +104,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
     }
-    show(args, rays, &file)
+    show(args, rays, &file, args.output.as_deref())
 }
 
 fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
@@ -154,35 +154,50 @@ fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// Prints the fit: at listed rays where those are asked for, as JSON, or as a table.
-fn show(args: &FitArgs, rays: Option<Vec<RayColumns>>, file: &FitFile<'_>) -> Outcome {
+fn show(
+    args: &FitArgs,
+    rays: Option<Vec<RayColumns>>,
+    file: &FitFile<'_>,
+    written: Option<&Path>,
+) -> Outcome {
     if let Some(rays) = rays {
+        note_rays_outside(&rays, file.fit.region());
         let estimates = rays.into_iter().map(|ray| (ray, file.fit.radiance(&ray.ray())));
         write_out(|out| write_at(out, file.quantity, estimates))?;
     } else if args.json {
         write_out(|out| file.write(out))?;
     } else {
-        say(&summary(file.fit, file.quantity, file.notes))?;
+        say(&summary(args, file, written))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn summary(fit: &Fit, quantity: Quantity, notes: &[String]) -> String {
-    let [_, exitance_unit, flux_unit] = quantity.units();
-    let (exitance, flux) = (fit.exitance(), fit.flux());
-    let measured = fit.measured_fraction().map_or("unknown".to_owned(), percent);
+/// The fit's functions go on beyond what was measured, and say so in their u only in part.
+fn note_rays_outside(rays: &[RayColumns], region: &Region) {
+    let is_outside = |ray: &fit::Ray| {
+        let is_beyond = |value: f64, (low, high): (f64, f64)| value < low || value > high;
+        is_beyond(ray.x_m, region.x_m)
+            || is_beyond(ray.y_m, region.y_m)
+            || ray.theta_rad > region.theta_max_rad
+    };
+    let outside = rays.iter().filter(|ray| is_outside(&ray.ray())).count();
+    if outside > 0 {
+        let of = rays.len();
+        note(&format!("note: {outside} of {of} rays lie outside the region that was measured"));
+    }
+}
+
+fn summary(args: &FitArgs, file: &FitFile<'_>, written: Option<&Path>) -> String {
+    let fit = file.fit;
+    let simulated = if file.simulated { " (simulated)" } else { "" };
     let mut rows = vec![
+        row("samples", format!("{}{simulated}", args.source.display())),
         row("samples used", fit.n_used().to_string()),
         row("coefficients", fit.coefficients().len().to_string()),
         row("condition", format!("{:.1}", fit.condition())),
-        row("residual RMS", format!("{:.3e}", fit.residual_rms())),
-        row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)),
-        row("  of it measured", measured),
-        row("flux", with_uncertainty(flux.value, flux.u, flux_unit)),
     ];
-    rows.extend(notes.iter().map(|note| row("note", note.clone())));
+    rows.extend(field_rows(fit, file.quantity));
+    rows.extend(file.notes.iter().map(|note| row("note", note)));
+    rows.extend(written.map(|path| row("written to", path.display().to_string())));
     table(&rows)
-}
-
-fn row(name: &str, value: String) -> Vec<String> {
-    vec![name.to_owned(), value]
 }

@@ -9,7 +9,7 @@ use super::failure::Outcome;
 use super::outlook::{outlook, warning};
 use super::output::{note, say, say_json};
 use super::setup::Setup;
-use super::text::{duration, table};
+use super::text::{duration, row, table};
 use crate::plan::Prediction;
 use crate::rig::AXES;
 
@@ -56,10 +56,6 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
         ));
     }
     table(&rows)
-}
-
-fn row(name: &str, value: String) -> Vec<String> {
-    vec![name.to_owned(), value]
 }
 
 fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {

@@ -15,7 +15,7 @@ use super::failure::{Failure, Outcome};
 use super::inputs::{Bundle, Inputs, beside};
 use super::output::{say, say_json};
 use super::setup::{rig_at, stage_at};
-use super::text::{duration, table};
+use super::text::{duration, row, table};
 use crate::daemon::http::body::{
     Asked, JogBody, Nothing, ReadBody, ReadingBody, Run, Runs, Stands, Status, Submitted,
 };
@@ -96,7 +96,6 @@ pub(crate) fn status(args: &StatusArgs) -> Outcome {
 
 fn status_text(status: &Status, runs: &[Run]) -> String {
     let simulated = if status.simulated { " (simulated)" } else { "" };
-    let row = |name: &str, value: String| vec![name.to_owned(), value];
     let mut rows = vec![
         row("rig", format!("{}{simulated}", status.rig)),
         row("state", status.state.clone()),

@@ -13,6 +13,7 @@ use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::stopping;
 use super::summary::Summary;
+use super::text::shell_word;
 use crate::journal::Order;
 use crate::plan::{DarkMethod, Plan};
 use crate::run::{self, Job, OnFault};
@@ -118,7 +119,7 @@ fn interrupted(folder: &Path, outcome: &run::Outcome) -> Failure {
 
 /// What carries the run on.
 fn resume_line(folder: &Path) -> String {
-    format!("carry it on with `gonio resume {}`", folder.display())
+    format!("carry it on with `gonio resume {}`", shell_word(folder))
 }
 
 /// A plan that a simulated rig can't follow.

@@ -3,11 +3,13 @@
 
 use std::path::Path;
 
+use fit::Fit;
 use serde_json::{Value, json};
 
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
-use super::text::{duration, percent, table, with_uncertainty};
+use super::text::{duration, percent, row, table, with_uncertainty};
+use crate::rig::Quantity;
 use crate::rig::calibration::Flag;
 use crate::run::Outcome;
 
@@ -55,23 +57,15 @@ impl Summary<'_> {
             Err(error) => return vec![row("fit", format!("none: {error}"))],
         };
         let fit = &fitted.fit;
-        let [_, exitance_unit, flux_unit] = self.setup.rig.detector.quantity.units();
-        let (exitance, flux) = (fit.exitance(), fit.flux());
-        let mut rows = vec![
-            row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)),
-            row("flux", with_uncertainty(flux.value, flux.u, flux_unit)),
-        ];
+        let exitance = fit.exitance();
+        let mut rows = field_rows(fit, self.setup.rig.detector.quantity);
         if exitance.value > 0.0 {
             let independent = percent(exitance.u_independent / exitance.value);
             let whole = percent(exitance.u / exitance.value);
             rows.push(row(
                 "u, relative",
-                format!("{whole}, of it {independent} not shared by all readings"),
+                format!("{whole} (k = 1), its part not shared by all readings {independent}"),
             ));
-        }
-        if let Some(fraction) = fit.measured_fraction() {
-            let theta_max_deg = self.setup.region().theta_max_rad.to_degrees();
-            rows.push(row(&format!("of it within {theta_max_deg:.0}°"), percent(fraction)));
         }
         if let Some(truth) = self.results.truth.filter(|truth| truth.exitance > 0.0) {
             let error = exitance.value - truth.exitance;
@@ -158,6 +152,22 @@ impl Summary<'_> {
     }
 }
 
-fn row(name: &str, value: String) -> Vec<String> {
-    vec![name.to_owned(), value]
+/// What a fit says of its field, whoever asks.
+pub(crate) fn field_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
+    let [radiance_unit, exitance_unit, flux_unit] = quantity.units();
+    let (exitance, flux) = (fit.exitance(), fit.flux());
+    let mut rows =
+        vec![row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit))];
+    if let Some(fraction) = fit.measured_fraction() {
+        let name = format!("  within {:.0}°", fit.region().theta_max_rad.to_degrees());
+        rows.push(row(&name, format!("{} of the exitance", percent(fraction))));
+    }
+    rows.push(row("flux", with_uncertainty(flux.value, flux.u, flux_unit)));
+    let excess = fit.excess_rms();
+    if excess > 0.0 {
+        // What the fit's functions can't follow, or a source that wavers.
+        let text = format!("{excess:.2e} {radiance_unit} RMS beyond the readings' stated noise");
+        rows.push(row("misfit", text));
+    }
+    rows
 }

@@ -1,7 +1,11 @@
 //! Numbers and tables as people read them.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::time::Duration;
+
+/// Columns of a terminal that nobody made wider.
+const WIDTH: usize = 80;
 
 /// Rows in columns, each as wide as its widest cell; the last column is not padded.
 pub(crate) fn table(rows: &[Vec<String>]) -> String {
@@ -23,15 +27,50 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
     text
 }
 
+/// A row of a table of names and values.
+pub(crate) fn row(name: &str, value: impl Into<String>) -> Vec<String> {
+    vec![name.to_owned(), value.into()]
+}
+
+/// A text in lines of at most [`WIDTH`], each behind so many spaces; a longer word stands alone.
+pub(crate) fn wrapped(text: &str, indent: usize) -> String {
+    let mut wrapped = String::new();
+    let mut width = WIDTH;
+    for word in text.split_whitespace() {
+        let length = word.chars().count();
+        if width + 1 + length > WIDTH {
+            let line_end = if wrapped.is_empty() { "" } else { "\n" };
+            // Writing to a string does not fail.
+            let _ = write!(wrapped, "{line_end}{:indent$}{word}", "");
+            width = indent + length;
+        } else {
+            let _ = write!(wrapped, " {word}");
+            width += 1 + length;
+        }
+    }
+    wrapped.push('\n');
+    wrapped
+}
+
+/// A path as a shell reads it back.
+pub(crate) fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+:@%,".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text;
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
 /// A duration in the unit that a person would choose.
 pub(crate) fn duration(seconds: f64) -> String {
     if seconds < 1.0 {
         return format!("{:.0} ms", seconds * 1e3);
     }
-    if seconds < 60.0 {
+    if seconds < 59.95 {
         return format!("{seconds:.1} s");
     }
-    let whole = Duration::from_secs_f64(seconds.min(1e9)).as_secs();
+    let whole = Duration::from_secs_f64(seconds.min(1e9).round()).as_secs();
     let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
     if hours == 0 {
         format!("{minutes} min {seconds:02} s")
@@ -89,10 +128,30 @@ mod tests {
     fn durations_and_percentages_read_well() {
         assert_eq!(duration(0.05), "50 ms");
         assert_eq!(duration(3.25), "3.2 s");
+        assert_eq!(duration(59.97), "1 min 00 s");
         assert_eq!(duration(125.0), "2 min 05 s");
         assert_eq!(duration(7260.0), "2 h 01 min");
         assert_eq!(percent(0.012_34), "1.23 %");
         assert_eq!(percent(-0.000_45), "-0.0450 %");
+    }
+
+    #[test]
+    fn paths_can_be_pasted_into_a_shell() {
+        assert_eq!(
+            shell_word(Path::new("runs/lamp-20261122T101500Z")),
+            "runs/lamp-20261122T101500Z"
+        );
+        assert_eq!(shell_word(Path::new("my runs/no. 1")), "'my runs/no. 1'");
+        assert_eq!(shell_word(Path::new("Kim's")), "'Kim'\\''s'");
+    }
+
+    #[test]
+    fn long_texts_stay_within_a_terminal() {
+        let text = wrapped(&"word ".repeat(40), 7);
+        assert!(
+            text.lines().all(|line| line.chars().count() <= WIDTH && line.starts_with("       w"))
+        );
+        assert_eq!(text.split_whitespace().count(), 40);
     }
 
     #[test]
