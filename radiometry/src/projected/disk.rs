@@ -261,8 +261,8 @@ impl View {
     }
 }
 
-/// x - sin x for x in [0, π], without the difference where it cancels.
-fn less_sine(x: f64) -> f64 {
+/// x - sin x for x not below 0, without the difference where it cancels.
+pub(super) fn less_sine(x: f64) -> f64 {
     if x > 1.0 {
         return x - libm::sin(x);
     }

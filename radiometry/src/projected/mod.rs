@@ -6,7 +6,10 @@
 //! quadrature. It knows no radiance and no rig.
 
 mod disk;
+mod occluded;
+mod outline;
 mod polygon;
+mod seen;
 mod smooth;
 mod sphere;
 
@@ -18,6 +21,7 @@ use crate::domain::{DomainError, direction, finite_vector};
 use crate::quantity::ProjectedSolidAngle;
 
 pub use disk::{disk, disk_parallel, disk_tilted};
+pub use occluded::{Occluder, Source, occluded};
 pub use polygon::polygon;
 pub use sphere::{sphere, sphere_tilted};
 

@@ -47,6 +47,11 @@ impl Polygon {
     pub fn vertices(&self) -> &[DVec3] {
         &self.vertices_m
     }
+
+    /// With lengths in units of two to the power, exactly.
+    pub(crate) fn in_units(&self, exponent: i32) -> Self {
+        Self { vertices_m: self.vertices_m.iter().map(|v| in_units(*v, exponent)).collect() }
+    }
 }
 
 fn enough_vertices(vertices: &[DVec3]) -> Result<(), DomainError> {
