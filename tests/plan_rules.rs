@@ -31,6 +31,9 @@ fn noisy(rules: &str) -> Bench {
 
 const GAIN: &str = "name = \"1 uA\"\nfull_scale_a = 1e-6\nu_relative = 1e-5";
 
+/// Three coefficients.
+const LITTLE: &str = "angular_degree = 1\nposition_degree = 0";
+
 fn run(bench: &Bench) -> Said {
     bench.gonio(&["run", "plan.toml", "--out", "run", "--json"])
 }
@@ -138,12 +141,15 @@ fn in_real_time_the_rule_is_asked_beside_the_run() {
         .with("rig.toml", "speed_deg_per_s = 60", "speed_deg_per_s = 1000")
         .with("rig.toml", "acceleration_deg_per_s2 = 120", "acceleration_deg_per_s2 = 20000")
         .with("rig.toml", "speed_mm_per_s = 100", "speed_mm_per_s = 1000")
-        .with("rig.toml", "settle_ms = 50", "settle_ms = 5");
+        .with("rig.toml", "acceleration_mm_per_s2 = 500", "acceleration_mm_per_s2 = 20000")
+        .with("rig.toml", "settle_ms = 50", "settle_ms = 5")
+        .with("plan.toml", "dwell_ms = 2000", "dwell_ms = 50")
+        .with("plan.toml", "angular_degree = 2\nposition_degree = 1", LITTLE);
     let said = bench.gonio(&["run", "plan.toml", "--out", "run", "--json", "--realtime"]);
     let summary = said.well().json();
     assert_eq!(summary["outcome"], "reached");
-    assert_eq!(summary["rule"], "exitance to 5.00 % after 36 of 400 targets");
-    assert!(summary["targets_measured"].as_u64().unwrap() < 60);
+    assert_eq!(summary["rule"], "exitance to 5.00 % after 6 of 400 targets");
+    assert!(summary["targets_measured"].as_u64().unwrap() < 40);
 }
 
 #[test]
