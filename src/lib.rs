@@ -5,8 +5,9 @@
 //! above it in this list (`ARCHITECTURE.md` has the picture, `tests/tidy.rs` holds the rules):
 //! [`rig`] what the rig is and what it yields · [`plan`] what to measure, and what it costs ·
 //! [`study`] accuracy against time · [`journal`] readings, durable before they count · [`device`]
-//! how hardware is spoken to · [`export`] files for other tools · [`run`] the run machine and the
-//! engine that pumps it · [`daemon`] the owner of a rig over HTTP · [`cli`] the command line.
+//! how hardware is spoken to · [`export`] files for other tools · [`report`] pictures · [`run`]
+//! the run machine and the engine that pumps it · [`daemon`] the owner of a rig over HTTP ·
+//! [`cli`] the command line.
 
 pub mod cli;
 pub mod daemon;

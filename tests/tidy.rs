@@ -42,7 +42,22 @@ const PURE: [&str; 9] = [
     "photometry-files/src/",
 ];
 
+/// Where a library is known: SQL, HTTP, arguments, serial ports, terminals and linear algebra can
+/// each be replaced by changing these places alone.
+const KNOWN_IN: [(&str, &[&str]); 8] = [
+    ("rusqlite", &["src/journal/"]),
+    ("hyper", &["src/daemon/http/", "src/cli/client.rs"]),
+    ("clap", &["src/cli/args.rs", "src/cli/mod.rs"]),
+    ("tokio_serial", &["src/device/"]),
+    ("serialport", &["src/device/"]),
+    ("indicatif", &["src/cli/"]),
+    ("faer", &["fit/src/"]),
+    ("rand_pcg", &["sim/src/"]),
+];
+
 const LINES_MAX: usize = 500;
+/// An overview that is longer is read by nobody.
+const ARCHITECTURE_LINES_MAX: usize = 150;
 
 struct Source {
     path: String,
@@ -70,16 +85,17 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn collect(folder: &Path, sources: &mut Vec<Source>) {
+/// Every file of the repository that ends so, with its text.
+fn collect(folder: &Path, ends: &[&str], sources: &mut Vec<Source>) {
     let mut entries: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     entries.sort();
     for path in entries {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if path.is_dir() {
             if name != "target" && !name.starts_with('.') && name != "runs" {
-                collect(&path, sources);
+                collect(&path, ends, sources);
             }
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+        } else if path.extension().is_some_and(|extension| ends.iter().any(|e| extension == *e)) {
             let relative = path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/");
             sources.push(Source { path: relative, text: fs::read_to_string(&path).unwrap() });
         }
@@ -88,7 +104,7 @@ fn collect(folder: &Path, sources: &mut Vec<Source>) {
 
 fn sources() -> Vec<Source> {
     let mut sources = Vec::new();
-    collect(&root(), &mut sources);
+    collect(&root(), &["rs"], &mut sources);
     assert!(sources.len() > 20, "the sources were not found");
     sources
 }
@@ -158,6 +174,7 @@ fn rooms_import_only_from_lower_floors() {
             }
         }
     }
+    broken.extend(lines_with(&["use crate::{"], |path| !path.starts_with("src/")));
     demand(
         &broken,
         "rule 2: no arrow runs up, and no two rooms of a floor know each other",
@@ -213,9 +230,20 @@ fn links_know_bytes_and_only_a_driver_knows_both() {
 }
 
 #[test]
-fn only_the_journal_knows_sql() {
-    let broken = lines_with(&["rusqlite"], |path| path.starts_with("src/journal/"));
-    demand(&broken, "rule 6: only journal knows SQL", "ask the journal for what you need");
+fn each_outer_library_is_known_in_one_place() {
+    for (library, places) in KNOWN_IN {
+        let words = [format!("{library}::"), format!("use {library}")];
+        let words = words.each_ref().map(String::as_str);
+        let broken = lines_with(&words, |path| places.iter().any(|place| path.starts_with(place)));
+        demand(
+            &broken,
+            &format!("rule 6: only {} knows {library}", places.join(" and ")),
+            "ask that room for what you need",
+        );
+    }
+    let terminal = ["println!(", "print!("];
+    let broken = lines_with(&terminal, |path| path.starts_with("src/cli/"));
+    demand(&broken, "only the command line speaks to a terminal", "hand the text to cli");
 }
 
 #[test]
@@ -265,6 +293,57 @@ fn files_open_with_what_they_are_and_stay_small() {
         .map(|s| s.path.clone())
         .collect();
     demand(&nameless, "a file opens with //!", "say what it is and what it does not know");
+}
+
+#[test]
+fn every_room_and_crate_says_what_it_does_not_know() {
+    let rooms = FLOORS.iter().flat_map(|floor| floor.iter()).filter(|room| **room != "cli");
+    let rooms = rooms.map(|room| format!("src/{room}/mod.rs"));
+    let crates = CRATES.iter().map(|(name, _)| format!("{name}/src/lib.rs"));
+    let overview = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let mut broken = Vec::new();
+    for path in rooms.chain(crates) {
+        let text = fs::read_to_string(root().join(&path)).unwrap();
+        let head = text.lines().take_while(|line| line.starts_with("//!"));
+        if !head.clone().any(|line| line.to_lowercase().contains("know")) {
+            broken.push(path.clone());
+        }
+        let name = path.trim_start_matches("src/").split('/').next().unwrap();
+        if !overview.contains(&format!("\n| `{name}` |")) {
+            broken.push(format!("ARCHITECTURE.md: no row for {name}"));
+        }
+    }
+    demand(&broken, "a room is what it does not know", "say it in its //! and in ARCHITECTURE.md");
+    let lines = overview.lines().count();
+    assert!(lines <= ARCHITECTURE_LINES_MAX, "ARCHITECTURE.md: {lines} lines, shorten it");
+}
+
+#[test]
+fn documents_lead_somewhere_on_every_machine() {
+    let mut documents = Vec::new();
+    collect(&root(), &["md", "rs", "toml", "svg"], &mut documents);
+    let mut broken = Vec::new();
+    for document in documents.iter().filter(|d| d.path != "tests/tidy.rs") {
+        for home in ["/home/", "/root/", "/Users/", "/work/"] {
+            let places = document.text.lines().enumerate().filter(|(_, line)| line.contains(home));
+            broken.extend(places.map(|(i, _)| format!("{}:{}: {home}", document.path, i + 1)));
+        }
+        if !document.path.ends_with(".md") {
+            continue;
+        }
+        let folder = root().join(&document.path).parent().unwrap().to_path_buf();
+        for link in document.text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = link.split('#').next().unwrap();
+            if !link.contains("://") && !folder.join(file).exists() {
+                broken.push(format!("{}: no {link}", document.path));
+            }
+        }
+    }
+    demand(
+        &broken,
+        "no path of one machine, no link to nowhere",
+        "write the path from the repository's root or from the document",
+    );
 }
 
 #[test]
