@@ -43,6 +43,13 @@ pub enum DomainError {
         /// The interval's upper end, included.
         high: f64,
     },
+    /// Surfaces that do not lie to each other as the kernel asks for.
+    Placing {
+        /// Which of them.
+        argument: &'static str,
+        /// What it should be.
+        expected: &'static str,
+    },
     /// A direction that has no length.
     ZeroVector {
         /// The argument.
@@ -99,6 +106,9 @@ impl fmt::Display for DomainError {
             Self::Overflow { result } => write!(f, "{result} is beyond the largest double"),
             Self::Outside { argument, value, low, high } => {
                 write!(f, "{argument} is {value}, expected {low} to {high}")
+            }
+            Self::Placing { argument, expected } => {
+                write!(f, "{argument} is out of place, expected {expected}")
             }
             Self::ZeroVector { argument } => {
                 write!(f, "{argument} has length 0, expected a direction")

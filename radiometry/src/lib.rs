@@ -9,6 +9,7 @@
 
 pub mod basis;
 pub mod direction;
+pub mod form_factor;
 pub mod irradiance;
 pub mod projected;
 pub mod quadrature;

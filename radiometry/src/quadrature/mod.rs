@@ -11,6 +11,7 @@ mod cubature;
 mod quasi_monte_carlo;
 mod sum;
 
+pub(crate) use adaptive::adaptive_noisy;
 pub use adaptive::{adaptive, adaptive_between};
 pub use cubature::{Cell, cubature};
 pub use quasi_monte_carlo::{Sobol, quasi_monte_carlo};

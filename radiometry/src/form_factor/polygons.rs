@@ -1,0 +1,187 @@
+//! The form factor of two flat polygons, convex or not, in any position: sharing an edge or a vertex,
+//! near contact, far apart, or one cut by the plane of the other.
+
+use core::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::{contour, integrated, pairs};
+use crate::domain::{DomainError, positive};
+use crate::estimate::{Estimate, EstimateError, Tolerance};
+use crate::shape::Polygon;
+
+/// Nearer to a plane than this, in units of the extent of both polygons, is in it: four roundings.
+const IN_PLANE: f64 = 4.0 * f64::EPSILON;
+
+/// F from one polygon to another, nothing between them, as an estimate within a tolerance.
+///
+/// Each polygon acts by the face that it turns to the other. Where the plane of one cuts the other,
+/// the one acts by its front alone (from there its vertices run counter-clockwise) and the part of
+/// the other behind it is left out; so `polygons(a, b)` times the area of a is `polygons(b, a)` times
+/// that of b.
+///
+/// By Stokes' theorem A₁F₁₂ = (1/2π) ∮∮ ln r dr₁·dr₂ (Sparrow 1963), the inner integral over an edge in
+/// closed form, the outer by adaptive quadrature. Where that cancels, far apart and at grazing sight,
+/// cubature of the positive kernel over pairs of triangles takes over.
+///
+/// ```
+/// use glam::DVec3;
+/// use radiometry::{Tolerance, form_factor::polygons, shape::Polygon};
+/// // Floor and wall of a cube.
+/// let floor = Polygon::new(vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y])?;
+/// let wall = Polygon::new(vec![DVec3::ZERO, DVec3::Y, DVec3::new(0.0, 1.0, 1.0), DVec3::Z])?;
+/// let factor = polygons(&floor, &wall, Tolerance::from_relative(1e-10)?)?;
+/// assert!((factor.value - 0.200_043_776_075_403_15).abs() <= factor.error_bound);
+/// # Ok::<(), radiometry::EstimateError>(())
+/// ```
+pub fn polygons(
+    from: &Polygon,
+    to: &Polygon,
+    tolerance: Tolerance,
+) -> Result<Estimate, EstimateError> {
+    let pair = Pair::new(from, to)?;
+    let Some(facing) = pair.facing() else { return Ok(Estimate::closed(0.0, 0.0)) };
+    let area = pair.normal_from.length() / 2.0;
+    let wanted = tolerance.tightened(area.min(1.0));
+    let by_contour = contour::exchange(&facing, wanted);
+    let exchanged = match by_contour {
+        Ok(exchanged) => exchanged,
+        Err(EstimateError::Unmet { estimate: cancelled, .. }) => {
+            let positive = match pairs::exchange(&facing, wanted) {
+                Ok(estimate) | Err(EstimateError::Unmet { estimate, .. }) => estimate,
+                Err(error) => return Err(error),
+            };
+            let evaluations = cancelled.evaluations + positive.evaluations;
+            let better =
+                if positive.error_bound < cancelled.error_bound { positive } else { cancelled };
+            Estimate { evaluations, ..better }
+        }
+        Err(error) => return Err(error),
+    };
+    integrated(Ok(exchanged), 0.0, 1.0 / area, tolerance)
+}
+
+/// Throughput of all rays from one polygon to another, m²·sr: π A₁ F₁₂; conventions as in
+/// [`polygons`].
+///
+/// ```
+/// use glam::DVec3;
+/// use radiometry::{Tolerance, form_factor::throughput_of_polygons, shape::Polygon};
+/// let stop = |z: f64| {
+///     let corner = |x: f64, y: f64| DVec3::new(x, y, z);
+///     Polygon::new(vec![corner(0.0, 0.0), corner(1e-3, 0.0), corner(1e-3, 1e-3), corner(0.0, 1e-3)])
+/// };
+/// let beam = throughput_of_polygons(&stop(0.0)?, &stop(1.0)?, Tolerance::from_relative(1e-8)?)?;
+/// assert!((beam.value / 1e-12 - 1.0).abs() < 1e-5); // A₁A₂/d²
+/// # Ok::<(), radiometry::EstimateError>(())
+/// ```
+pub fn throughput_of_polygons(
+    from: &Polygon,
+    to: &Polygon,
+    tolerance: Tolerance,
+) -> Result<Estimate, EstimateError> {
+    let pair = Pair::new(from, to)?;
+    let area_m2 = libm::scalbn(pair.normal_from.length() / 2.0, 2 * pair.exponent);
+    if !area_m2.is_finite() {
+        return Err(DomainError::Overflow { result: "area_m2" }.into());
+    }
+    Ok(polygons(from, to, tolerance)?.scaled(PI * area_m2))
+}
+
+/// Both polygons in a unit of length that is a power of two, near the first one's first vertex.
+struct Pair {
+    from: Vec<DVec3>,
+    to: Vec<DVec3>,
+    /// Twice the area long, counter-clockwise around it.
+    normal_from: DVec3,
+    normal_to: DVec3,
+    exponent: i32,
+}
+
+/// What takes part of two polygons, in their order around the normals that they turn to each other.
+pub(super) struct Facing {
+    pub(super) from: Vec<DVec3>,
+    pub(super) to: Vec<DVec3>,
+    /// Of length 1.
+    pub(super) normal_from: DVec3,
+    pub(super) normal_to: DVec3,
+}
+
+impl Pair {
+    fn new(from: &Polygon, to: &Polygon) -> Result<Self, DomainError> {
+        // By eighths, so that no difference overflows.
+        let eighths = |polygon: &Polygon| polygon.vertices().iter().map(|v| *v / 8.0).collect();
+        let (from, to): (Vec<DVec3>, Vec<DVec3>) = (eighths(from), eighths(to));
+        let origin = from[0];
+        let extent = from.iter().chain(&to).map(|v| (*v - origin).abs().max_element());
+        let extent = positive("extent_m", extent.fold(0.0, f64::max))?;
+        let exponent = libm::ilogb(extent);
+        let near = |vertex: &DVec3| {
+            DVec3::from_array((*vertex - origin).to_array().map(|x| libm::scalbn(x, -exponent)))
+        };
+        let from: Vec<DVec3> = from.iter().map(near).collect();
+        let to: Vec<DVec3> = to.iter().map(near).collect();
+        let (normal_from, normal_to) = (normal(&from), normal(&to));
+        positive("area_from_m2", normal_from.length())?;
+        positive("area_to_m2", normal_to.length())?;
+        Ok(Self { from, to, normal_from, normal_to, exponent: exponent + 3 })
+    }
+
+    /// The parts that can see each other; none if there are none.
+    fn facing(&self) -> Option<Facing> {
+        let (normal_from, normal_to) = (self.normal_from.normalize(), self.normal_to.normalize());
+        let turn_from = side(self.from[0], normal_from, &self.to)?;
+        let turn_to = side(self.to[0], normal_to, &self.from)?;
+        let turned = |vertices: &[DVec3], sign: f64| {
+            let mut vertices = vertices.to_vec();
+            if sign < 0.0 {
+                vertices.reverse();
+            }
+            vertices
+        };
+        let (facing_from, facing_to) = (turn_from * normal_from, turn_to * normal_to);
+        let from = in_front(self.to[0], facing_to, &turned(&self.from, turn_from));
+        let to = in_front(self.from[0], facing_from, &turned(&self.to, turn_to));
+        let enough = from.len() > 2 && to.len() > 2;
+        enough.then_some(Facing { from, to, normal_from: facing_from, normal_to: facing_to })
+    }
+}
+
+/// The vector area, doubled (Newell), from the first vertex.
+fn normal(vertices: &[DVec3]) -> DVec3 {
+    let fan = vertices.windows(2).map(|edge| (edge[0] - vertices[0]).cross(edge[1] - vertices[0]));
+    fan.fold(DVec3::ZERO, |sum, triangle| sum + triangle)
+}
+
+fn height(point: DVec3, normal: DVec3, vertex: DVec3) -> f64 {
+    let height = normal.dot(vertex - point);
+    if height.abs() <= IN_PLANE { 0.0 } else { height }
+}
+
+/// 1 if there is anything in front of the plane, -1 if all is behind, nothing if all is in it.
+fn side(point: DVec3, normal: DVec3, vertices: &[DVec3]) -> Option<f64> {
+    let heights = || vertices.iter().map(|vertex| height(point, normal, *vertex));
+    if heights().any(|height| height > 0.0) {
+        Some(1.0)
+    } else {
+        heights().any(|height| height < 0.0).then_some(-1.0)
+    }
+}
+
+/// The part of a polygon in front of a plane (Sutherland and Hodgman 1974). Of one that is not convex
+/// the parts stay joined by edges in the plane, there and back, which the boundary integral does not
+/// notice.
+fn in_front(point: DVec3, normal: DVec3, vertices: &[DVec3]) -> Vec<DVec3> {
+    let mut kept = Vec::with_capacity(vertices.len() + 2);
+    for (i, end) in vertices.iter().enumerate() {
+        let start = vertices[(i + vertices.len() - 1) % vertices.len()];
+        let (above_start, above_end) = (height(point, normal, start), height(point, normal, *end));
+        if (above_start < 0.0 && above_end > 0.0) || (above_start > 0.0 && above_end < 0.0) {
+            kept.push(start + (*end - start) * (above_start / (above_start - above_end)));
+        }
+        if above_end >= 0.0 {
+            kept.push(*end);
+        }
+    }
+    kept
+}
