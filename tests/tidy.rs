@@ -328,7 +328,7 @@ fn documents_lead_somewhere_on_every_machine() {
             let places = document.text.lines().enumerate().filter(|(_, line)| line.contains(home));
             broken.extend(places.map(|(i, _)| format!("{}:{}: {home}", document.path, i + 1)));
         }
-        if !document.path.ends_with(".md") {
+        if Path::new(&document.path).extension().is_none_or(|extension| extension != "md") {
             continue;
         }
         let folder = root().join(&document.path).parent().unwrap().to_path_buf();

@@ -18,8 +18,6 @@ pub(crate) struct ProgressLine {
     pace: Pace,
     /// Of each gain range, the last dark level, counts: good enough to look at.
     darks: Vec<f64>,
-    /// Predicted, of finding the home marks.
-    homing_s: f64,
 }
 
 impl ProgressLine {
@@ -37,8 +35,7 @@ impl ProgressLine {
             bar.set_style(style);
         }
         let darks = vec![0.0; setup.rig.detector.gains.len()];
-        let homing_s = setup.sequence.prediction.homing_s;
-        Self { bar, rig: setup.rig.clone(), pace, darks, homing_s }
+        Self { bar, rig: setup.rig.clone(), pace, darks }
     }
 
     /// A line of its own, above the bar, that stays.
@@ -51,10 +48,10 @@ impl ProgressLine {
         match happening {
             Happening::Fault(fault) => self.say(&format!("fault: {fault}")),
             Happening::Finished(_) => self.bar.finish_and_clear(),
-            Happening::Progress(progress) => self.show_progress(*progress, 0.0),
+            Happening::Progress(progress) => self.show_progress(*progress),
             Happening::Reading(reading) => self.show_reading(reading),
             Happening::State(State::Homing) => {
-                self.show_progress(progress, self.homing_s);
+                self.show_progress(progress);
                 self.bar.set_message("looking for the home marks");
             }
             Happening::State(state @ (State::Stopping | State::Paused | State::Faulted)) => {
@@ -64,9 +61,8 @@ impl ProgressLine {
         }
     }
 
-    fn show_progress(&self, progress: Progress, before_s: f64) {
+    fn show_progress(&self, progress: Progress) {
         let Progress { done, total, rig_s, rest_s } = progress;
-        let rest_s = rest_s + before_s;
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
         self.bar.set_prefix(match self.pace {
