@@ -8,9 +8,11 @@
 //! from +x towards +y.
 
 pub mod basis;
+pub mod convex;
 pub mod direction;
 pub mod form_factor;
 pub mod irradiance;
+pub mod moments;
 pub mod projected;
 pub mod quadrature;
 pub mod quantity;

@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use radiometry::form_factor::{self, aligned_rectangles};
+use radiometry::quadrature::quasi_monte_carlo;
 use radiometry::shape::Polygon;
 use radiometry::{Estimate, EstimateError, Tolerance};
 use serde_json::Value;
@@ -244,5 +245,71 @@ fn nothing_given_makes_a_nan_or_a_panic() {
         if let (Ok(from), Ok(to)) = (triangle(a), triangle(b)) {
             check(form_factor::polygons(&from, &to, coarse).map(value));
         }
+    }
+}
+
+#[test]
+fn polygons_agree_with_quasi_monte_carlo() {
+    let corners = |list: [[f64; 3]; 3]| list.map(DVec3::from_array);
+    let mut chance = Chance(17);
+    for seed in 0..8 {
+        let mut vertex = |z: f64| [chance.next(), chance.next(), z + 0.5 * chance.next()];
+        let from = corners([vertex(0.0), vertex(0.0), vertex(0.0)]);
+        let to = corners([vertex(2.0), vertex(2.0), vertex(2.0)]);
+        let place = |t: [DVec3; 3], u: f64, v: f64| {
+            let root = u.sqrt();
+            t[0] + root * ((t[1] - t[0]) + v * (t[2] - t[1]))
+        };
+        let normals = [from, to].map(|t| (t[1] - t[0]).cross(t[2] - t[0]));
+        let turned = |normal: DVec3, towards: DVec3| normal * normal.dot(towards).signum();
+        let facing = [turned(normals[0], to[0] - from[0]), turned(normals[1], from[0] - to[0])];
+        let scale = facing[1].length() / 2.0 / std::f64::consts::PI;
+        let ray = |p: &[f64; 4]| {
+            let (start, end) = (place(from, p[0], p[1]), place(to, p[2], p[3]));
+            let ray = end - start;
+            let cosines = [facing[0].dot(ray), -facing[1].dot(ray)].map(|cosine| cosine.max(0.0));
+            let lengths = facing[0].length() * facing[1].length();
+            scale * cosines[0] * cosines[1] / lengths / ray.length_squared().powi(2)
+        };
+        let one_side = |point: DVec3, normal: DVec3, all: [DVec3; 3]| {
+            all.iter().all(|vertex| normal.dot(*vertex - point) > 0.0)
+        };
+        // Where a plane cuts the other triangle, the two count different rays.
+        if !one_side(from[0], facing[0], to) || !one_side(to[0], facing[1], from) {
+            continue;
+        }
+        let tolerance = Tolerance::from_relative(1e-4).unwrap();
+        let sampled = quasi_monte_carlo(ray, seed, tolerance).unwrap();
+        let polygon = |t: [DVec3; 3]| Polygon::new(t.to_vec()).unwrap();
+        let fine = Tolerance::from_relative(1e-9).unwrap();
+        let exact = form_factor::polygons(&polygon(from), &polygon(to), fine).unwrap();
+        assert!(
+            (sampled.value - exact.value).abs() <= sampled.error_bound,
+            "{sampled:?} {exact:?}"
+        );
+    }
+}
+
+#[test]
+fn triangles_that_share_an_edge_are_reciprocal_and_turn_with_the_frame() {
+    let mut chance = Chance(19);
+    let tolerance = Tolerance::from_relative(1e-8).unwrap();
+    for _ in 0..20 {
+        let (along, across) = (chance.size(1.0), chance.size(2.0));
+        let angle = 0.05 + 3.0 * chance.next();
+        let apex = DVec3::new(chance.next(), angle.cos() * across, angle.sin() * across);
+        let first = [DVec3::ZERO, DVec3::X * along, DVec3::new(chance.next(), 1.0, 0.0)];
+        let second = [DVec3::ZERO, DVec3::X * along, apex];
+        let polygon = |t: [DVec3; 3]| Polygon::new(t.to_vec()).unwrap();
+        let factor = |a: [DVec3; 3], b: [DVec3; 3]| {
+            form_factor::polygons(&polygon(a), &polygon(b), tolerance)
+                .unwrap_or_else(|error| panic!("{a:?} {b:?}: {error}"))
+        };
+        let (there, back) = (factor(first, second), factor(second, first));
+        assert!(close(there.value, across * back.value, 2e-8), "{there:?} {back:?}");
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.2, -2.0);
+        let moved = |t: [DVec3; 3]| t.map(|vertex| turn * vertex + DVec3::new(3.0, -1.0, 2.0));
+        let turned = factor(moved(first), moved(second));
+        assert!(close(there.value, turned.value, 2e-8), "{there:?} {turned:?}");
     }
 }
