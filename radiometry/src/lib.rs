@@ -10,6 +10,7 @@
 pub mod basis;
 pub mod convex;
 pub mod direction;
+pub mod enclosure;
 pub mod form_factor;
 pub mod irradiance;
 pub mod moments;
