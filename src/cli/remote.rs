@@ -15,7 +15,7 @@ use super::failure::{Failure, Outcome};
 use super::inputs::{Bundle, Inputs, beside};
 use super::output::{say, say_json};
 use super::setup::{rig_at, stage_at};
-use super::text::{duration, row, table};
+use super::text::{duration, row, table, wrapped};
 use crate::daemon::http::body::{
     Asked, JogBody, Nothing, ReadBody, ReadingBody, Run, Runs, Stands, Status, Submitted,
 };
@@ -116,19 +116,32 @@ fn status_text(status: &Status, runs: &[Run]) -> String {
     let mut text = table(&rows);
     if !runs.is_empty() {
         text.push('\n');
-        let head = ["run", "plan", "state", "submitted", ""].map(str::to_owned).to_vec();
-        let lines = runs.iter().map(|run| {
-            let Run { id, name, state, submitted_utc, detail, .. } = run;
-            let first = detail.lines().next().unwrap_or_default();
-            [&id.to_string(), name, state, submitted_utc, first].map(str::to_owned).to_vec()
-        });
-        text.push_str(&table(&std::iter::once(head).chain(lines).collect::<Vec<_>>()));
+        text.push_str(&runs_text(runs));
     }
     for id in &status.interrupted_runs {
         let _ = writeln!(
             text,
             "\n  run {id} waits: `gonio continue {id}` carries it on, `gonio abort {id}` ends it"
         );
+    }
+    text
+}
+
+/// A row for every run, and below it how it went.
+fn runs_text(runs: &[Run]) -> String {
+    let head = ["run", "plan", "state", "submitted"].map(str::to_owned).to_vec();
+    let rows = runs.iter().map(|run| {
+        let Run { id, name, state, submitted_utc, .. } = run;
+        vec![id.to_string(), name.clone(), state.clone(), submitted_utc.clone()]
+    });
+    let rows = table(&std::iter::once(head).chain(rows).collect::<Vec<_>>());
+    let details = std::iter::once("").chain(runs.iter().map(|run| run.detail.as_str()));
+    let mut text = String::new();
+    for (row, detail) in rows.lines().zip(details) {
+        let _ = writeln!(text, "{row}");
+        if let Some(first) = detail.lines().next() {
+            text.push_str(&wrapped(first, 7));
+        }
     }
     text
 }
