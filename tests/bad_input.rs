@@ -128,7 +128,7 @@ fn a_rig_or_scene_is_never_made_up() {
     refused(&bench, &with_scene, &["--scene scene.toml", "is a real rig", "leave --scene out"]);
     let explain = ["explain", "scene.toml", "--rig", "rig.toml"];
     refused(&bench, &explain, &["is a real rig", "leave --rig out"]);
-    refused(&bench, &["sim"], &["no scene to look at", "--scene"]);
+    refused(&bench, &["sim"], &["needs a scene to look at", "--scene"]);
 }
 
 #[test]

@@ -14,6 +14,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpStream, UnixStream};
 use tokio::runtime::Runtime;
 
+use super::acquire::Pace;
 use super::args::DaemonAddress;
 use super::failure::Failure;
 use crate::daemon::http::body::ErrorBody;
@@ -62,10 +63,7 @@ impl Client {
             Some(text) => Address::parse(text).map_err(Failure::start)?,
             None => default_address(Path::new(DATA_DEFAULT))?,
         };
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+        let runtime = Pace::Real.runtime()?;
         Ok(Self { address, runtime })
     }
 

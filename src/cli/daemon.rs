@@ -4,14 +4,14 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use super::acquire::opener_of;
+use super::acquire::{Pace, opener_of};
 use super::args::DaemonArgs;
 use super::client::default_address;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
 use super::output::note;
 use super::session::draw_session;
-use super::setup::{rig_at, stage_at};
+use super::setup::{no_scene, rig_at, stage_at};
 use super::shop::Shop;
 use super::simulated::StopSignals;
 use crate::daemon::{Address, Config, Daemon, DaemonError, RigThread, Shutdown};
@@ -25,10 +25,7 @@ pub(crate) fn daemon(args: &DaemonArgs) -> Outcome {
         None => default_address(&args.data)?,
     };
     let config = Config { data: args.data.clone(), listen };
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+    let runtime = Pace::Real.runtime()?;
     let rig = start_rig(&shop)?;
     let served = runtime.block_on(serve(&config, shop, &rig));
     // Results that are still being written are written again after a continue.
@@ -44,10 +41,7 @@ fn open_shop(args: &DaemonArgs) -> Result<Shop, Failure> {
         (Some(scene), true) => Some(stage_at(&mut inputs, scene, &rig, args.seed)?),
         (None, false) => None,
         (None, true) => {
-            return Err(Failure::with_help(
-                format!("{}: a simulated rig needs a scene to look at", args.rig.display()),
-                "give one with --scene, for example examples/luminaire/scene.toml",
-            ));
+            return Err(no_scene(&rig));
         }
         (Some(scene), false) => {
             return Err(Failure::with_help(

@@ -7,6 +7,7 @@ use super::failure::Failure;
 use super::results::write_inputs;
 use super::session::{utc_now, utc_stamp};
 use super::setup::Setup;
+use super::text::shell_word;
 use crate::journal::{Header, Journal};
 
 /// The file that all else can be made from.
@@ -38,21 +39,26 @@ pub(crate) fn header(setup: &Setup) -> Header {
 /// Makes the folder with the copies of its inputs and the journal, from which the run can be
 /// carried on as soon as this returns. Where that fails nothing is left behind.
 pub(crate) fn create(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {
-    let shown = folder.display();
     if let Some(parent) = folder.parent() {
         std::fs::create_dir_all(parent).map_err(|error| no_folder(parent, &error))?;
     }
     std::fs::create_dir(folder).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => Failure::with_help(
-            format!("{shown}: exists already; a run is never overwritten"),
-            "choose another folder with --out, or carry the run on with `gonio resume`",
-        ),
+        ErrorKind::AlreadyExists => exists_already(folder),
         _ => no_folder(folder, &error),
     })?;
     fill(folder, setup).inspect_err(|_| {
         // Made a moment ago, by us; what is in it is of no use.
         let _ = std::fs::remove_dir_all(folder);
     })
+}
+
+/// The refusal of a folder that is there.
+pub(crate) fn exists_already(folder: &Path) -> Failure {
+    let line = format!("gonio resume {}", shell_word(folder));
+    Failure::with_help(
+        format!("{}: exists already; a run is never overwritten", folder.display()),
+        format!("choose another folder with --out, or carry the run on with `{line}`"),
+    )
 }
 
 fn no_folder(folder: &Path, error: &std::io::Error) -> Failure {

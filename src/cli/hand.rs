@@ -10,7 +10,7 @@ use super::client::Client;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
 use super::remote::{self, daemon_for, tell_reading, tell_stand};
-use super::setup::{Stage, rig_at, stage_at};
+use super::setup::{Stage, no_scene, rig_at, stage_at};
 use crate::daemon::http::body::{ReadingBody, Stands};
 use crate::rig::{Pose, Rig, forward};
 use crate::run::{HandError, OwnerHandle, Stand, TakeOne, own};
@@ -144,12 +144,7 @@ impl Bench {
         if !rig.is_simulated() {
             return Ok(Self { rig, stage: None });
         }
-        let scene = args.rig.scene.as_ref().ok_or_else(|| {
-            Failure::with_help(
-                format!("{} is a simulated rig and needs a scene to look at", rig.name),
-                "give one with --scene",
-            )
-        })?;
+        let scene = args.rig.scene.as_ref().ok_or_else(|| no_scene(&rig))?;
         let stage = stage_at(&mut inputs, scene, &rig, args.rig.seed)?;
         Ok(Self { rig, stage: Some(stage) })
     }

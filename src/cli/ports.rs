@@ -6,6 +6,7 @@ use std::time::Duration;
 use firmware_protocol::Identity;
 use serde_json::json;
 
+use super::acquire::Pace;
 use super::args::PortsArgs;
 use super::failure::{Failure, Outcome};
 use super::output::{note, say, say_json};
@@ -39,10 +40,7 @@ pub(crate) fn ports(args: &PortsArgs) -> Outcome {
 
 fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
     note(&format!("opening {port} at {baud} baud and asking who is there; nothing will move"));
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+    let runtime = Pace::Real.runtime()?;
     let settings = SerialSettings {
         port: port.to_owned(),
         baud,

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::acquire::{Acquired, Pace, acquire, exit_code};
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
-use super::folder::{create, default_folder};
+use super::folder::{create, default_folder, exists_already};
 use super::outlook::warning;
 use super::output::{note, say, say_json};
 use super::results::{Results, targets_planned};
@@ -30,7 +30,9 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
     let began = Instant::now();
     let setup = Setup::from_disk(&args.plan, &args.rig)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&setup.plan_name));
-    refuse_existing(&folder)?;
+    if folder.exists() {
+        return Err(exists_already(&folder));
+    }
     if let Some(warning) = warning(&setup) {
         note(&warning);
     }
@@ -50,16 +52,6 @@ pub(crate) fn first_job(setup: &Setup, on_fault: OnFault, pace: Pace) -> Result<
     job.rig_time_max = setup.plan.stop.rig_time_max;
     job.rule = stopping::rule(setup, Vec::new(), pace)?;
     Ok(job)
-}
-
-fn refuse_existing(folder: &Path) -> Result<(), Failure> {
-    if !folder.exists() {
-        return Ok(());
-    }
-    Err(Failure::with_help(
-        format!("{}: exists already; a run is never overwritten", folder.display()),
-        "choose another folder with --out, or carry the run on with `gonio resume`",
-    ))
 }
 
 /// Evaluates the journal, writes the folder's files, and prints the summary.

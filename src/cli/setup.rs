@@ -218,6 +218,14 @@ fn read_stage(
     Ok(Some(stage_at(inputs, &path, rig, seed)?))
 }
 
+/// The refusal of a simulated rig that nobody gave anything to look at.
+pub(crate) fn no_scene(rig: &Rig) -> Failure {
+    Failure::with_help(
+        format!("{}: a simulated rig needs a scene to look at", rig.name),
+        "give one with --scene, for example examples/luminaire/scene.toml",
+    )
+}
+
 /// Reads the scene at a path and compiles it for the rig.
 pub(crate) fn stage_at(
     inputs: &mut Inputs,

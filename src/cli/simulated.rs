@@ -9,12 +9,13 @@ use tokio::io::{DuplexStream, duplex};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
+use super::acquire::Pace;
 use super::args::SimArgs;
 use super::failure::{Failure, Outcome};
 use super::inputs::{BUILT_IN, Inputs};
 use super::output::{note, say};
 use super::session::draw_session;
-use super::setup::{Stage, rig_at, stage_at};
+use super::setup::{Stage, no_scene, rig_at, stage_at};
 use crate::device::{Link, Opener, opener};
 
 /// Bytes that wait between host and wire: as much as a serial port's driver buffers.
@@ -68,18 +69,10 @@ pub(crate) fn sim(args: &SimArgs) -> Outcome {
     let mut inputs = Inputs::from_disk();
     let path = args.rig.rig.clone().unwrap_or_else(|| BUILT_IN.into());
     let rig = rig_at(&mut inputs, &path)?;
-    let scene = args.rig.scene.as_ref().ok_or_else(|| {
-        Failure::with_help(
-            "no scene to look at",
-            "give one with --scene, for example examples/luminaire/scene.toml",
-        )
-    })?;
+    let scene = args.rig.scene.as_ref().ok_or_else(|| no_scene(&rig))?;
     let stage = stage_at(&mut inputs, scene, &rig, args.rig.seed)?;
     let baud = args.baud.unwrap_or_else(|| rig.link.baud());
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| Failure::start(format!("no runtime: {error}")))?;
+    let runtime = Pace::Real.runtime()?;
     runtime.block_on(serve_on_pty(args, &stage, baud))
 }
 
