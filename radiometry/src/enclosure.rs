@@ -16,6 +16,8 @@ use crate::quantity::{Area, Exitance, FormFactor, Irradiance, Radiance};
 const EXCESS_MAX: f64 = 1e-6;
 /// Sweeps of Gauss and Seidel at most.
 const SWEEPS: usize = 100_000;
+/// What may be missing of a radiosity, relative to the largest.
+const SETTLED: f64 = 1e-14;
 
 /// The form factors among surfaces that together leave no way out.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +80,7 @@ impl fmt::Display for EnclosureError {
                 f.write_str("no surface absorbs, expected a reflectance below 1 where light comes")
             }
             Self::Unsettled { change } => {
-                write!(f, "the radiosity still changes by {change:e}, expected 1e-14")
+                write!(f, "the radiosity still changes by {change:e} a sweep, expected 0")
             }
         }
     }
@@ -130,6 +132,7 @@ impl Enclosure {
         }
         let mut exchange = vec![vec![0.0; count]; count];
         for i in 0..count {
+            #[expect(clippy::needless_range_loop, reason = "both entries of a symmetric pair")]
             for j in i + 1..count {
                 let ratio = within("form factor", factor(i, j).ratio(), 0.0, 1.0)?;
                 exchange[i][j] = areas_m2[i] * ratio;
@@ -187,16 +190,7 @@ impl Enclosure {
             within("reflectance", *reflectance, 0.0, 1.0)?;
         }
         let mut leaving: Vec<f64> = emitted.iter().map(|exitance| exitance.w_per_m2()).collect();
-        let mut change = f64::INFINITY;
-        for _ in 0..SWEEPS {
-            change = self.sweep(&mut leaving, emitted, reflectance)?;
-            if change <= 1e-14 {
-                break;
-            }
-        }
-        if change > 1e-14 {
-            return Err(EnclosureError::Unsettled { change });
-        }
+        self.settle(&mut leaving, emitted, reflectance)?;
         let irradiance =
             (0..surfaces).map(|i| Irradiance::from_w_per_m2(self.arriving(i, &leaving)));
         let irradiance = irradiance.collect();
@@ -204,8 +198,28 @@ impl Enclosure {
         Ok(Radiosity { exitance, irradiance })
     }
 
-    /// One sweep; the largest change relative to the largest radiosity, judged by how much of a
-    /// change is still to come.
+    /// Sweeps until what is still to come, the rest of a geometric series of changes, does not count.
+    fn settle(
+        &self,
+        leaving: &mut [f64],
+        emitted: &[Exitance],
+        reflectance: &[f64],
+    ) -> Result<(), EnclosureError> {
+        let mut last = f64::INFINITY;
+        for _ in 0..SWEEPS {
+            let change = self.sweep(leaving, emitted, reflectance)?;
+            let still_to_come = change * (change / (last - change));
+            if change <= 2.0 * f64::EPSILON
+                || (last.is_finite() && change < last && still_to_come <= SETTLED)
+            {
+                return Ok(());
+            }
+            last = change;
+        }
+        Err(EnclosureError::Unsettled { change: last })
+    }
+
+    /// One sweep; the largest change relative to the largest radiosity.
     fn sweep(
         &self,
         leaving: &mut [f64],
