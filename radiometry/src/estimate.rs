@@ -70,6 +70,13 @@ impl Tolerance {
     }
 }
 
+impl Tolerance {
+    /// For an integral that a factor will make the value of: the relative tolerance stays.
+    pub(crate) fn before_factor(self, factor: f64) -> Self {
+        Self { absolute: (self.absolute / factor).min(f64::MAX), ..self }
+    }
+}
+
 impl Default for Tolerance {
     /// Ten digits, a million evaluations.
     fn default() -> Self {

@@ -42,7 +42,7 @@ pub fn polygons(
     let pair = Pair::new(from, to)?;
     let Some(facing) = pair.facing() else { return Ok(Estimate::closed(0.0, 0.0)) };
     let area = pair.normal_from.length() / 2.0;
-    let wanted = tolerance.tightened(area.min(1.0));
+    let wanted = tolerance.before_factor(1.0 / area);
     let by_contour = contour::exchange(&facing, wanted);
     let exchanged = match by_contour {
         Ok(exchanged) => exchanged,

@@ -174,7 +174,7 @@ pub fn wedge_rectangles(
         beta_max * libm::sin(beta) * sin * lines_along(longest, l)
     };
     let scale = 1.0 / (PI * a * sin_phi);
-    let wanted = tolerance.tightened(1.0 / scale.max(1.0));
+    let wanted = tolerance.before_factor(scale);
     integrated(adaptive_between(lines, &[0.0, 1.0, 2.0], wanted), 0.0, scale, tolerance)
 }
 

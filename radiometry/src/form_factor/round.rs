@@ -91,7 +91,7 @@ fn disk_average(
     let radius_2_at = ((radius_2 - low) / span).clamp(0.0, 1.0);
     let kink = 2.0 * libm::asin(radius_2_at.sqrt());
     let scale = 1.0 / (PI * radius_1 * radius_1);
-    let wanted = tolerance.tightened(1.0 / scale.max(1.0));
+    let wanted = tolerance.before_factor(scale);
     let outer = if span > 0.0 {
         adaptive_between(arcs, &[0.0, kink, PI], wanted)
     } else {
@@ -196,7 +196,7 @@ pub fn spheres(
         libm::sin(gamma_0 + 2.0 * from_0) * lens * span * sin * cos
     };
     let scale = 1.0 / (2.0 * PI * radius_1 * radius_1);
-    let wanted = tolerance.tightened(1.0 / scale.max(1.0));
+    let wanted = tolerance.before_factor(scale);
     let shared = adaptive_between(shared, &[0.0, FRAC_PI_2, PI], wanted);
     integrated(shared, eclipsed, scale, tolerance)
 }
