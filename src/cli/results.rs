@@ -21,6 +21,9 @@ use crate::study::Score;
 
 /// Points of the accuracy curve at most: each is a fit of its own.
 const ACCURACY_POINTS: u32 = 12;
+/// Beyond this condition a least-squares fit asks for regularisation rather than for digits: an
+/// error of 1e-4 may be one of the order of 1.
+const ACCURACY_CONDITION_MAX: f64 = 1e4;
 
 /// What a run says.
 #[derive(Debug)]
@@ -199,7 +202,9 @@ fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Op
     Some((stated, score))
 }
 
-/// Fits of the first readings, ever more of them: half as many for each point further back.
+/// Fits of the first readings, ever more of them: half as many for two points further back.
+/// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
+/// of it is determined by its noise and its truncation alone, and is no point of the curve.
 fn accuracy(calibrated: &Calibrated, region: &Region, basis: BasisSpec) -> Vec<AccuracyPoint> {
     let total = calibrated.samples.len();
     let mut counts: Vec<usize> = (0..ACCURACY_POINTS)
@@ -217,7 +222,7 @@ fn accuracy(calibrated: &Calibrated, region: &Region, basis: BasisSpec) -> Vec<A
         let known = calibrated.first(count);
         let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
         let fit = known.fit(region, basis).ok()?.fit;
-        Some(AccuracyPoint {
+        (fit.condition() <= ACCURACY_CONDITION_MAX).then(|| AccuracyPoint {
             rig_s: last.fold(0.0, f64::max),
             readings: count as u64,
             exitance: fit.exitance(),
