@@ -8,15 +8,18 @@
 //! from +x towards +y.
 
 pub mod basis;
+pub mod chart;
 pub mod convex;
 pub mod direction;
 pub mod enclosure;
 pub mod form_factor;
+pub mod interface;
 pub mod irradiance;
 pub mod moments;
 pub mod projected;
 pub mod quadrature;
 pub mod quantity;
+pub mod ray;
 pub mod shape;
 pub mod solid_angle;
 pub mod throughput;
@@ -24,6 +27,7 @@ pub mod throughput;
 mod domain;
 mod error_free;
 mod estimate;
+mod polynomial;
 mod wide;
 
 pub use domain::DomainError;
