@@ -55,6 +55,7 @@ mod error;
 mod fitted;
 mod grid;
 mod peak;
+pub mod regression;
 mod sample;
 mod shift;
 mod solve;
