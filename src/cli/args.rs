@@ -71,6 +71,10 @@ pub(crate) enum Command {
     ///
     /// Example: gonio read --rig rig.toml --dwell-ms 200
     Read(ReadArgs),
+    /// Compute one quantity of radiometry, or many as JSON lines; SI units, radians.
+    ///
+    /// Example: gonio calc disk-solid-angle --radius 0.005 --distance 0.3
+    Calc(CalcArgs),
     /// Own a rig for a long time: a queue of runs over HTTP.
     ///
     /// Example: gonio daemon --rig rig.toml --data /var/lib/gonio
@@ -304,6 +308,23 @@ pub(crate) struct ReadArgs {
     /// The gain range, by its name in rig.toml. Default: the rig's first.
     #[arg(long, value_name = "NAME")]
     pub(crate) gain: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CalcArgs {
+    /// Show every quantity, its inputs with their units, and an example of each.
+    #[arg(long)]
+    pub(crate) list: bool,
+    /// Answer JSON lines from standard input; with a QUANTITY or --list, print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// The quantity, and its inputs: a value is a number, numbers between commas, or JSON.
+    #[arg(
+        value_name = "QUANTITY [--name value ...]",
+        trailing_var_arg = true,
+        allow_hyphen_values = true
+    )]
+    pub(crate) words: Vec<String>,
 }
 
 /// Where the daemon listens.

@@ -3,6 +3,7 @@
 
 mod acquire;
 mod args;
+pub mod calc;
 mod client;
 mod daemon;
 mod explain;
@@ -52,6 +53,7 @@ pub fn main() -> ExitCode {
         Command::Jog(args) => hand::jog(&args),
         Command::Read(args) => hand::read(&args),
         Command::Plan(args) => plan::plan(&args),
+        Command::Calc(args) => calc::calc(&args),
         Command::Daemon(args) => daemon::daemon(&args),
         Command::Submit(args) => remote::submit(&args),
         Command::Status(args) => remote::status(&args),
