@@ -160,7 +160,7 @@ pub fn frame(normal: DVec3) -> (DVec3, DVec3) {
 
 /// The vector times a power of two, so that its largest component is in [1, 2): exact but for
 /// components so small that they no longer matter.
-pub(crate) fn scaled(vector: DVec3) -> DVec3 {
+fn scaled(vector: DVec3) -> DVec3 {
     let largest = vector.abs().max_element();
     if largest == 0.0 || !largest.is_finite() {
         return vector;

@@ -318,7 +318,11 @@ fn harmonics_are_orthonormal() {
             {
                 let sin = ((1.0 - z) * (1.0 + z)).sqrt();
                 let at = DVec3::new(sin * phi.cos(), sin * phi.sin(), z);
-                if is_half { half.evaluate(at, &mut values) } else { whole.evaluate(at, &mut values) }
+                if is_half {
+                    half.evaluate(at, &mut values)
+                } else {
+                    whole.evaluate(at, &mut values)
+                }
                 let solid_angle =
                     weight * 2.0 * PI / spokes as f64 * if is_half { 0.5 } else { 1.0 };
                 for i in 0..count {

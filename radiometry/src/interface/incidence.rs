@@ -5,8 +5,7 @@ use core::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use crate::direction::scaled;
-use crate::domain::{DomainError, within};
+use crate::domain::{self, DomainError, within};
 use crate::error_free::{DoubleDouble, cosine};
 
 /// The angle between a ray and the normal of the surface that it meets, in [0, π/2].
@@ -38,7 +37,8 @@ impl Incidence {
     /// From a ray's direction and a normal against it, both of any length. Zero vectors and a
     /// direction along the normal's half-space are errors.
     pub fn between(direction: DVec3, normal: DVec3) -> Result<Self, DomainError> {
-        let (direction, normal) = (vector("direction", direction)?, vector("normal", normal)?);
+        let (direction, normal) =
+            (domain::direction("direction", direction)?, domain::direction("normal", normal)?);
         let dot = dot(direction, normal);
         if dot.to_f64() > 0.0 {
             let value = dot.to_f64() / (direction.length() * normal.length());
@@ -65,18 +65,6 @@ impl Incidence {
     pub(super) const fn cos_squared(self) -> DoubleDouble {
         self.cos_squared
     }
-}
-
-/// The vector in a scale of its own, if it has a direction.
-fn vector(argument: &'static str, vector: DVec3) -> Result<DVec3, DomainError> {
-    let largest = vector.abs().max_element();
-    if !vector.is_finite() {
-        return Err(DomainError::NotFinite { argument, value: f64::NAN });
-    }
-    if largest == 0.0 {
-        return Err(DomainError::NotPositive { argument, value: 0.0 });
-    }
-    Ok(scaled(vector))
 }
 
 fn dot(a: DVec3, b: DVec3) -> DoubleDouble {

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::{Exact, Ray, cross_of, dot, dot_of, numbers, point};
-use crate::domain::{DomainError, positive};
+use super::{Exact, Ray, cross_of, dot, dot_of, numbers};
+use crate::domain::{DomainError, finite_vector, positive};
 use crate::error_free::two_sum;
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
@@ -36,8 +36,8 @@ impl Ray {
         top: DVec3,
         radius_m: f64,
     ) -> Result<Option<f64>, DomainError> {
-        point("base", base)?;
-        point("top", top)?;
+        finite_vector("base", base)?;
+        finite_vector("top", top)?;
         let mut lengths = [positive("radius_m", radius_m)?];
         let local = self.local([base, top], &mut lengths);
         let scale = |length: f64| libm::scalbn(length, -local.exponent);

@@ -2,9 +2,8 @@
 
 use glam::DVec3;
 
-use super::{Exact, Ray, cross_of, dot, dot_of, exact, numbers, point, vector};
-use crate::direction::scaled;
-use crate::domain::{DomainError, not_negative};
+use super::{Exact, Ray, cross_of, dot, dot_of, exact, numbers};
+use crate::domain::{DomainError, direction, finite_vector, not_negative};
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
 impl Ray {
@@ -19,8 +18,8 @@ impl Ray {
     /// # Ok::<(), radiometry::DomainError>(())
     /// ```
     pub fn plane(self, at: DVec3, normal: DVec3) -> Result<Option<f64>, DomainError> {
-        point("point", at)?;
-        let normal = exact(scaled(vector("normal", normal)?));
+        finite_vector("point", at)?;
+        let normal = exact(direction("normal", normal)?);
         let local = self.local([at], &mut []);
         let along = dot(&normal, &self.exact_direction());
         let height = dot(&normal, &local.points[0]);
@@ -38,8 +37,8 @@ impl Ray {
         normal: DVec3,
         radius_m: f64,
     ) -> Result<Option<f64>, DomainError> {
-        point("center", center)?;
-        let exact_normal = exact(scaled(vector("normal", normal)?));
+        finite_vector("center", center)?;
+        let exact_normal = exact(direction("normal", normal)?);
         let mut lengths = [not_negative("radius_m", radius_m)?];
         let local = self.local([center], &mut lengths);
         let reach = Reach {

@@ -25,8 +25,7 @@ mod triangle;
 
 use glam::DVec3;
 
-use crate::direction::scaled;
-use crate::domain::DomainError;
+use crate::domain::{self, DomainError, finite_vector};
 use crate::error_free::two_sum;
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
@@ -50,8 +49,8 @@ struct Local<const N: usize> {
 impl Ray {
     /// A finite origin, and a finite direction that is not the zero vector.
     pub fn new(origin: DVec3, direction: DVec3) -> Result<Self, DomainError> {
-        point("origin", origin)?;
-        Ok(Self { origin, direction: scaled(vector("direction", direction)?) })
+        finite_vector("origin", origin)?;
+        Ok(Self { origin, direction: domain::direction("direction", direction)? })
     }
 
     /// The same ray seen from its origin, with the points' differences exact; lengths go through
@@ -89,19 +88,6 @@ impl Ray {
             Err(DomainError::Overflow { result: "the distance to the hit, m," })
         }
     }
-}
-
-fn point(argument: &'static str, point: DVec3) -> Result<DVec3, DomainError> {
-    let wrong = point.to_array().into_iter().find(|x| !x.is_finite());
-    wrong.map_or(Ok(point), |value| Err(DomainError::NotFinite { argument, value }))
-}
-
-/// A vector that has a direction.
-fn vector(argument: &'static str, vector: DVec3) -> Result<DVec3, DomainError> {
-    if point(argument, vector)? == DVec3::ZERO {
-        return Err(DomainError::NotPositive { argument, value: 0.0 });
-    }
-    Ok(vector)
 }
 
 fn exact(vector: DVec3) -> Exact {

@@ -1,38 +1,30 @@
-//! A ray against a plane polygon, convex or not, and against what lies in the ray's own plane.
+//! A ray against a polygon, convex or not, and against what lies in the ray's own plane.
 
 use glam::DVec3;
 
-use super::{Exact, Ray, determinant, dot, point};
-use crate::domain::{DomainError, within};
+use super::{Exact, Ray, determinant, dot};
+use crate::domain::DomainError;
 use crate::quadrature::Sum;
-
-/// A vertex may be off the polygon's plane by this part of the polygon's size.
-const OFF_PLANE: f64 = 1e-9;
-/// More vertices than anyone draws; the winding number costs a few determinants for each.
-const VERTICES_MAX: f64 = 1e6;
+use crate::shape::Polygon;
 
 impl Ray {
-    /// Distance to a plane polygon without self-intersections, m, from either side; its border
-    /// belongs to it, decided by exact signs. Fewer than 3 vertices, a polygon without area, or one
-    /// that is not plane is an error.
+    /// Distance to a polygon, m, from either side; its border belongs to it, decided by exact
+    /// signs. A ray within its plane meets its border first, or is on it from the start.
     ///
     /// ```
     /// use glam::DVec3;
-    /// use radiometry::ray::Ray;
+    /// use radiometry::{ray::Ray, shape::Polygon};
     /// // An L: the ray passes the notch.
     /// let l = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)]
     ///     .map(|(x, y)| DVec3::new(x, y, 3.0));
+    /// let l = Polygon::new(l.to_vec())?;
     /// let up = |x: f64, y: f64| Ray::new(DVec3::new(x, y, 0.0), DVec3::Z);
     /// assert_eq!(up(0.5, 1.5)?.polygon(&l)?, Some(3.0));
     /// assert_eq!(up(1.5, 1.5)?.polygon(&l)?, None);
     /// # Ok::<(), radiometry::DomainError>(())
     /// ```
-    pub fn polygon(self, vertices: &[DVec3]) -> Result<Option<f64>, DomainError> {
-        within("the number of vertices", vertices.len() as f64, 3.0, VERTICES_MAX)?;
-        for vertex in vertices {
-            point("vertex", *vertex)?;
-        }
-        demand_plane(vertices)?;
+    pub fn polygon(self, polygon: &Polygon) -> Result<Option<f64>, DomainError> {
+        let vertices = polygon.vertices();
         let direction = self.exact_direction();
         // One scale for all, from the box that holds them.
         let most = vertices.iter().fold(DVec3::ZERO, |most, v| most.max(v.abs()));
@@ -56,19 +48,6 @@ impl Ray {
         let height: Sum = sides().map(|(p, q)| determinant(&points[0], p, q)).collect();
         self.ahead(height.value() / along.value(), scale)
     }
-}
-
-/// The vertices lie in one plane, by Newell's normal, and enclose an area.
-fn demand_plane(vertices: &[DVec3]) -> Result<(), DomainError> {
-    let first = vertices[0];
-    let size = vertices.iter().map(|v| (*v - first).abs().max_element()).fold(0.0, f64::max);
-    let sides = || vertices.iter().map(|v| (*v - first) / size);
-    let normal: DVec3 = sides().zip(sides().skip(1)).map(|(a, b)| a.cross(b)).sum();
-    let no_area = DomainError::NotPositive { argument: "the polygon's area", value: 0.0 };
-    let normal = crate::direction::normalised(normal).ok_or(no_area)?;
-    let off = sides().map(|side| side.dot(normal).abs()).fold(0.0, f64::max);
-    within("a vertex's distance from the polygon's plane, by its size,", off, 0.0, OFF_PLANE)?;
-    Ok(())
 }
 
 /// Whether the closed path winds around the line through the origin along the direction, or meets

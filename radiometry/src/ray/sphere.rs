@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::{Exact, Ray, cross_of, dot, dot_of, numbers, point};
-use crate::domain::{DomainError, not_negative};
+use super::{Exact, Ray, cross_of, dot, dot_of, numbers};
+use crate::domain::{DomainError, finite_vector, not_negative};
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
 impl Ray {
@@ -37,7 +37,7 @@ impl Ray {
         radius_m: f64,
         is_solid: bool,
     ) -> Result<Option<f64>, DomainError> {
-        point("center", center)?;
+        finite_vector("center", center)?;
         let mut lengths = [not_negative("radius_m", radius_m)?];
         let local = self.local([center], &mut lengths);
         let (offset, direction) = (local.points[0], self.exact_direction());

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::polygon::first_within_plane;
-use super::{Exact, Ray, determinant, point};
-use crate::domain::DomainError;
+use super::{Exact, Ray, determinant};
+use crate::domain::{DomainError, finite_vector};
 use crate::error_free::two_sum;
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
@@ -62,7 +62,7 @@ impl Ray {
     /// Edge functions dᵀ(a × b) about the ray (Plücker): of one sign, or zero on an edge.
     fn hit(self, corners: [DVec3; 3]) -> Result<Option<Hit>, DomainError> {
         for corner in corners {
-            point("corner", corner)?;
+            finite_vector("corner", corner)?;
         }
         demand_area(corners)?;
         let local = self.local(corners, &mut []);

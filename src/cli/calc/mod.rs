@@ -7,6 +7,7 @@ mod bases;
 mod inputs;
 mod interfaces;
 mod least_squares;
+mod light;
 mod motion;
 mod quantity;
 mod rays;

@@ -4,16 +4,19 @@
 use std::fmt;
 
 use glam::DVec3;
-use radiometry::DomainError;
+use radiometry::{DomainError, Estimate, EstimateError, Tolerance};
 use serde_json::{Value, json};
 
 use super::inputs::Inputs;
-use super::{angles, bases, interfaces, least_squares, motion, rays, solid_angles, statistics};
+use super::{
+    angles, bases, interfaces, least_squares, light, motion, rays, solid_angles, statistics,
+};
 
 /// The families, in the order in which they are listed.
 const FAMILIES: &[&[Quantity]] = &[
     angles::QUANTITIES,
     solid_angles::QUANTITIES,
+    light::QUANTITIES,
     interfaces::QUANTITIES,
     rays::QUANTITIES,
     bases::QUANTITIES,
@@ -129,6 +132,27 @@ impl fmt::Display for Refusal {
 impl From<DomainError> for Refusal {
     fn from(error: DomainError) -> Self {
         Self(error.to_string())
+    }
+}
+
+impl From<EstimateError> for Refusal {
+    fn from(error: EstimateError) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl From<Estimate> for Answer {
+    fn from(estimate: Estimate) -> Self {
+        Self::within(estimate.value, estimate.error_bound)
+    }
+}
+
+/// How well an integral is asked for; ten digits where nothing is said.
+pub(super) fn tolerance(inputs: Inputs<'_>) -> Result<Tolerance, Refusal> {
+    if inputs.has("relative_tolerance") {
+        Ok(Tolerance::from_relative(inputs.number("relative_tolerance")?)?)
+    } else {
+        Ok(Tolerance::default())
     }
 }
 

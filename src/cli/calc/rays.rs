@@ -1,6 +1,7 @@
 //! Where a ray first meets a surface: distances in metres, whatever the direction's length.
 
 use radiometry::ray::Ray;
+use radiometry::shape::Polygon;
 
 use super::inputs::Inputs;
 use super::quantity::{Input, Quantity, Refusal, Rounding};
@@ -70,7 +71,10 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         unit: "m",
         example: "--origin 0.5,0.5,0 --direction 0,0,1 --vertices [[0,0,1],[2,0,1],[0,2,1]]",
         rounding: ROUNDING,
-        compute: |inputs| Ok(ray(inputs)?.polygon(&inputs.vectors("vertices")?)?.into()),
+        compute: |inputs| {
+            let polygon = Polygon::new(inputs.vectors("vertices")?)?;
+            Ok(ray(inputs)?.polygon(&polygon)?.into())
+        },
     },
     Quantity {
         name: "ray-cylinder-distance",

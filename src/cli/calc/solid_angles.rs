@@ -1,11 +1,26 @@
 //! Solid angles and projected solid angles.
 
+use glam::DVec3;
+use radiometry::projected::{self, Occluder, Receiver, Source};
 use radiometry::quantity::SolidAngle;
+use radiometry::shape::{Disk, HalfPlane, Polygon, Sphere};
 use radiometry::solid_angle;
 
-use super::quantity::{Input, Quantity, Rounding};
+use super::inputs::Inputs;
+use super::quantity::{Input, Quantity, Refusal, Rounding, tolerance};
 
 const SR: &str = "sr";
+
+const A: Input = Input::new("a", "x,y,z, m");
+const B: Input = Input::new("b", "x,y,z, m");
+const C: Input = Input::new("c", "x,y,z, m");
+const POINT: Input = Input::new("point", "x,y,z of the receiver, m");
+const NORMAL: Input = Input::new("normal", "the receiver's, x,y,z of any length");
+const NORMAL_ANGLE: Input =
+    Input::new("normal_angle", "rad, from the receiver's normal to the body's centre, 0 to π");
+const CENTER: Input = Input::new("center", "x,y,z, m");
+const RADIUS: Input = Input::new("radius", "m");
+const DISTANCE: Input = Input::new("distance", "m");
 
 pub(super) const QUANTITIES: &[Quantity] = &[
     Quantity {
@@ -62,4 +77,175 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             Ok(solid_angle::disk(radius, distance)?.sr().into())
         },
     },
+    Quantity {
+        name: "triangle-solid-angle",
+        inputs: &[A, B, C],
+        unit: SR,
+        example: "--a 1,0,0 --b 0,1,0 --c 0,0,1",
+        rounding: Rounding::Relative(1e-13),
+        compute: |inputs| {
+            let (a, b, c) = (inputs.vector("a")?, inputs.vector("b")?, inputs.vector("c")?);
+            Ok(solid_angle::triangle(a, b, c)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "signed-triangle-solid-angle",
+        inputs: &[POINT, A, B, C],
+        unit: SR,
+        example: "--point 0,0,0 --a 1,0,0 --b 0,1,0 --c 0,0,1",
+        rounding: Rounding::Relative(1e-12),
+        compute: |inputs| {
+            let (a, b, c) = (inputs.vector("a")?, inputs.vector("b")?, inputs.vector("c")?);
+            Ok(solid_angle::triangle_signed(inputs.vector("point")?, a, b, c)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "polygon-projected-solid-angle",
+        inputs: &[POINT, NORMAL, Input::new("vertices", "list of [x,y,z], m")],
+        unit: SR,
+        example: "--point 0,0,0 --normal 0,0,1 --vertices [[0,0,1],[1,0,1],[0,1,1]]",
+        rounding: Rounding::Relative(1e-12),
+        compute: |inputs| {
+            let polygon = Polygon::new(inputs.vectors("vertices")?)?;
+            Ok(projected::polygon(&receiver(inputs)?, &polygon)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "disk-projected-solid-angle",
+        inputs: &[RADIUS, DISTANCE, Input::new("offset", "m, of the centre from the normal")],
+        unit: SR,
+        example: "--radius 1 --distance 1 --offset 0",
+        rounding: Rounding::Relative(1e-13),
+        compute: |inputs| {
+            let (radius, distance) = (inputs.number("radius")?, inputs.number("distance")?);
+            Ok(projected::disk_parallel(radius, distance, inputs.number("offset")?)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "tilted-disk-projected-solid-angle",
+        inputs: &[RADIUS, DISTANCE, NORMAL_ANGLE],
+        unit: SR,
+        example: "--radius 1 --distance 1 --normal-angle 1",
+        rounding: Rounding::Relative(1e-10),
+        compute: |inputs| {
+            let (radius, distance) = (inputs.number("radius")?, inputs.number("distance")?);
+            let angle = inputs.number("normal_angle")?;
+            Ok(projected::disk_tilted(radius, distance, angle)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "projected-solid-angle-of-disk",
+        inputs: &[POINT, NORMAL, CENTER, Input::new("axis", "x,y,z of any length"), RADIUS],
+        unit: SR,
+        example: "--point 0,0,0 --normal 0,0,1 --center 0,0,1 --axis 0,0,-1 --radius 1",
+        rounding: Rounding::Relative(1e-10),
+        compute: |inputs| {
+            let disk = disk(inputs, inputs.direction("axis")?)?;
+            Ok(projected::disk(&receiver(inputs)?, &disk)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "sphere-projected-solid-angle",
+        inputs: &[RADIUS, DISTANCE, NORMAL_ANGLE],
+        unit: SR,
+        example: "--radius 1 --distance 2 --normal-angle 0.3",
+        rounding: Rounding::Relative(1e-10),
+        compute: |inputs| {
+            let (radius, distance) = (inputs.number("radius")?, inputs.number("distance")?);
+            let angle = inputs.number("normal_angle")?;
+            Ok(projected::sphere_tilted(radius, distance, angle)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "projected-solid-angle-of-sphere",
+        inputs: &[POINT, NORMAL, CENTER, RADIUS],
+        unit: SR,
+        example: "--point 0,0,0 --normal 0,0,1 --center 0,0,2 --radius 1",
+        rounding: Rounding::Relative(1e-10),
+        compute: |inputs| Ok(projected::sphere(&receiver(inputs)?, &sphere(inputs)?)?.sr().into()),
+    },
+    Quantity {
+        name: "occluded-projected-solid-angle",
+        inputs: &[
+            POINT,
+            NORMAL,
+            Input::new("source", "{kind: disk | sphere | polygon, center, radius | vertices}"),
+            Input::new(
+                "occluder",
+                "{kind: half-plane | disk | sphere | polygon, x_max, z | center, radius | vertices}",
+            ),
+            Input::optional("relative_tolerance", "default 1e-10"),
+        ],
+        unit: SR,
+        example: "--point 0,0,0 --normal 0,0,1 \
+                  --source {\"kind\":\"disk\",\"center\":[0,0,4],\"radius\":1} \
+                  --occluder {\"kind\":\"half-plane\",\"x_max\":0,\"z\":2}",
+        rounding: Rounding::Stated,
+        compute: |inputs| {
+            let (source, occluder) =
+                (source(inputs.object("source")?)?, occluder(inputs.object("occluder")?)?);
+            let tolerance = tolerance(inputs)?;
+            Ok(projected::occluded(&receiver(inputs)?, &source, &occluder, tolerance)?.into())
+        },
+    },
 ];
+
+fn receiver(inputs: Inputs<'_>) -> Result<Receiver, Refusal> {
+    Ok(Receiver::new(inputs.vector("point")?, inputs.direction("normal")?)?)
+}
+
+fn disk(inputs: Inputs<'_>, axis: DVec3) -> Result<Disk, Refusal> {
+    Ok(Disk::new(inputs.vector("center")?, axis, inputs.number("radius")?)?)
+}
+
+fn sphere(inputs: Inputs<'_>) -> Result<Sphere, Refusal> {
+    Ok(Sphere::new(inputs.vector("center")?, inputs.number("radius")?)?)
+}
+
+/// What a body is described by, beside its kind.
+const ROUND: &[Input] = &[Input::new("kind", "word"), CENTER, RADIUS];
+const VERTICES: &[Input] =
+    &[Input::new("kind", "word"), Input::new("vertices", "list of [x,y,z], m")];
+const HALF_PLANE: &[Input] =
+    &[Input::new("kind", "word"), Input::new("x_max", "m"), Input::new("z", "m")];
+
+fn polygon(body: Inputs<'_>) -> Result<Polygon, Refusal> {
+    body.expect_only(VERTICES)?;
+    Ok(Polygon::new(body.vectors("vertices")?)?)
+}
+
+/// Disks lie across the z axis.
+fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
+    match body.text("kind")? {
+        "polygon" => Ok(Source::Polygon(polygon(body)?)),
+        "disk" => {
+            body.expect_only(ROUND)?;
+            Ok(Source::Disk(disk(body, DVec3::Z)?))
+        }
+        "sphere" => {
+            body.expect_only(ROUND)?;
+            Ok(Source::Sphere(sphere(body)?))
+        }
+        other => Err(Refusal::new(format!("the source kind `{other}` is not known"))),
+    }
+}
+
+fn occluder(body: Inputs<'_>) -> Result<Occluder, Refusal> {
+    match body.text("kind")? {
+        "polygon" => Ok(Occluder::Polygon(polygon(body)?)),
+        "disk" => {
+            body.expect_only(ROUND)?;
+            Ok(Occluder::Disk(disk(body, DVec3::Z)?))
+        }
+        "sphere" => {
+            body.expect_only(ROUND)?;
+            Ok(Occluder::Sphere(sphere(body)?))
+        }
+        "half-plane" => {
+            body.expect_only(HALF_PLANE)?;
+            let half_plane = HalfPlane::new(body.number("x_max")?, body.number("z")?)?;
+            Ok(Occluder::HalfPlane(half_plane))
+        }
+        other => Err(Refusal::new(format!("the occluder kind `{other}` is not known"))),
+    }
+}

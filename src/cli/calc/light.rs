@@ -1,0 +1,128 @@
+//! Light itself: throughput, the density of throughput in each chart, irradiance and exitance.
+
+use std::f64::consts::PI;
+
+use radiometry::chart::{Environment, Perpendicular, Surface, TwoPlane};
+use radiometry::quantity::{ProjectedSolidAngle, Radiance};
+use radiometry::throughput;
+
+use super::inputs::Inputs;
+use super::quantity::{Input, Quantity, Refusal, Rounding};
+
+const ROUNDING: Rounding = Rounding::Relative(4e-15);
+
+const THETA: Input = Input::new("theta", "rad, from the normal");
+const RADIANCE: Input = Input::new("radiance", "W/(m² sr)");
+
+pub(super) const QUANTITIES: &[Quantity] = &[
+    Quantity {
+        name: "throughput-coaxial-disks",
+        inputs: &[Input::new("r1", "m"), Input::new("r2", "m"), Input::new("h", "m, gap")],
+        unit: "m² sr",
+        example: "--r1 0.00625 --r2 0.0025 --h 0.3",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let (r1, r2) = (inputs.number("r1")?, inputs.number("r2")?);
+            Ok(throughput::coaxial_disks(r1, r2, inputs.number("h")?)?.m2_sr().into())
+        },
+    },
+    Quantity {
+        name: "chart-density-surface",
+        inputs: &[THETA],
+        unit: "sr/rad²",
+        example: "--theta 0.5",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let theta_rad = angle(inputs, PI / 2.0)?;
+            Ok(Surface { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad: 0.0 }.density().into())
+        },
+    },
+    Quantity {
+        name: "chart-density-perpendicular",
+        inputs: &[Input::new("theta", "rad, 0 to π")],
+        unit: "sr/rad²",
+        example: "--theta 0.5",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let theta_rad = angle(inputs, PI)?;
+            Ok(Perpendicular { theta_rad, phi_rad: 0.0, x_m: 0.0, y_m: 0.0 }.density().into())
+        },
+    },
+    Quantity {
+        name: "chart-density-two-plane",
+        inputs: &[
+            Input::new("u", "m, in the first plane"),
+            Input::new("v", "m, in the first plane"),
+            Input::new("s", "m, in the second plane"),
+            Input::new("t", "m, in the second plane"),
+            Input::new("distance", "m, between the planes"),
+        ],
+        unit: "sr/m²",
+        example: "--u 0 --v 0 --s 0.1 --t 0 --distance 0.3",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let chart = TwoPlane {
+                u_m: inputs.number("u")?,
+                v_m: inputs.number("v")?,
+                s_m: inputs.number("s")?,
+                t_m: inputs.number("t")?,
+                distance_m: inputs.number("distance")?,
+            };
+            // Refuses planes that are none.
+            chart.line()?;
+            Ok(chart.density().into())
+        },
+    },
+    Quantity {
+        name: "chart-density-environment",
+        inputs: &[THETA],
+        unit: "sr/rad²",
+        example: "--theta 0.5",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let theta_rad = angle(inputs, PI / 2.0)?;
+            Ok(Environment { theta_rad, phi_rad: 0.0 }.density().into())
+        },
+    },
+    Quantity {
+        name: "irradiance",
+        inputs: &[RADIANCE, Input::new("projected_solid_angle", "sr, 0 to π")],
+        unit: "W/m²",
+        example: "--radiance 100 --projected-solid-angle 6e-5",
+        rounding: Rounding::Relative(2.3e-16),
+        compute: |inputs| {
+            let seen =
+                ProjectedSolidAngle::from_sr(between(inputs, "projected_solid_angle", 0.0, PI)?);
+            Ok((radiance(inputs)? * seen).w_per_m2().into())
+        },
+    },
+    Quantity {
+        name: "exitance",
+        inputs: &[RADIANCE],
+        unit: "W/m²",
+        example: "--radiance 100",
+        rounding: Rounding::Relative(2.3e-16),
+        compute: |inputs| {
+            // Of a diffuse emitter: π L.
+            let hemisphere = ProjectedSolidAngle::from_sr(PI);
+            Ok(radiance(inputs)?.exitance_into(hemisphere).w_per_m2().into())
+        },
+    },
+];
+
+fn radiance(inputs: Inputs<'_>) -> Result<Radiance, Refusal> {
+    Ok(Radiance::from_w_per_m2_sr(between(inputs, "radiance", 0.0, f64::MAX)?))
+}
+
+fn angle(inputs: Inputs<'_>, max: f64) -> Result<f64, Refusal> {
+    between(inputs, "theta", 0.0, max)
+}
+
+fn between(inputs: Inputs<'_>, name: &str, low: f64, high: f64) -> Result<f64, Refusal> {
+    let value = inputs.number(name)?;
+    if (low..=high).contains(&value) {
+        Ok(value)
+    } else {
+        Err(Refusal::new(format!("{name} is {value}, expected {low} to {high}")))
+    }
+}
