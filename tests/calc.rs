@@ -163,14 +163,17 @@ fn sizes_below_zero_and_normals_of_no_length_are_refused() {
     }
 }
 
-fn takes_a_tolerance(inputs: &Value) -> bool {
-    inputs.get("relative_tolerance").is_some()
+/// Integrals: at such sizes one may spend its whole budget, which takes minutes unoptimised.
+fn is_integrated(name: &str) -> bool {
+    name.starts_with("occluded")
+        || name.starts_with("form-factor")
+        || name.contains("disk-projected")
+        || name.ends_with("of-disk")
 }
 
 #[test]
 fn the_largest_and_smallest_doubles_give_a_number_or_a_sentence() {
-    // An integral with a tolerance may spend its whole budget on each: minutes, unoptimised.
-    for (name, inputs) in one_of_each().into_iter().filter(|(_, i)| !takes_a_tolerance(i)) {
+    for (name, inputs) in one_of_each().into_iter().filter(|(name, _)| !is_integrated(name)) {
         for (key, value) in inputs.as_object().expect("an object") {
             for extreme in
                 [f64::MAX, -f64::MAX, f64::MIN_POSITIVE, 5e-324, 0.0, -0.0, 1e160, 1e-160]
