@@ -22,7 +22,7 @@ mod window;
 use glam::DVec3;
 
 use crate::direction::normalised;
-use crate::domain::{DomainError, positive};
+use crate::domain::{DomainError, positive, within};
 use crate::error_free::{DoubleDouble, two_sum};
 
 pub use incidence::Incidence;
@@ -47,9 +47,11 @@ struct Passage {
 }
 
 impl Interface {
-    /// Refractive indices, both positive and finite.
+    /// Refractive indices, both positive and finite, and within a factor of 1e60 of each other.
     pub fn new(n1: f64, n2: f64) -> Result<Self, DomainError> {
+        const RATIO_MAX: f64 = 1e60;
         let (n1, n2) = (positive("n1", n1)?, positive("n2", n2)?);
+        within("n2/n1", n2 / n1, 1.0 / RATIO_MAX, RATIO_MAX)?;
         let exponent = -libm::ilogb(n1.max(n2));
         Ok(Self { n1: libm::scalbn(n1, exponent), n2: libm::scalbn(n2, exponent) })
     }
@@ -114,7 +116,14 @@ impl Interface {
     pub fn transmittance_s(self, incidence: Incidence) -> f64 {
         let share = |passage: Passage| {
             let sum = passage.p + passage.q;
-            if passage.is_open() { 1.0 } else { 4.0 * (passage.p / sum) * (passage.q / sum) }
+            if passage.is_open() {
+                1.0
+            } else if sum == 0.0 {
+                // Grazing, beyond the range of doubles.
+                0.0
+            } else {
+                4.0 * (passage.p / sum) * (passage.q / sum)
+            }
         };
         self.passage(incidence).map_or(0.0, share).min(1.0)
     }
@@ -124,7 +133,14 @@ impl Interface {
         let share = |passage: Passage| {
             let (inward, outward) = self.p_terms(passage);
             let sum = inward + outward;
-            if passage.is_open() { 1.0 } else { 4.0 * (inward / sum) * (outward / sum) }
+            if passage.is_open() {
+                1.0
+            } else if sum == 0.0 {
+                // Grazing, beyond the range of doubles.
+                0.0
+            } else {
+                4.0 * (inward / sum) * (outward / sum)
+            }
         };
         self.passage(incidence).map_or(0.0, share).min(1.0)
     }
@@ -187,6 +203,9 @@ impl Interface {
         let bracket = incidence.cos_squared().mul(n1_squared.add(n2_squared)).sub(n1_squared);
         let (inward, outward) = self.p_terms(passage);
         let sum = inward + outward;
+        if sum == 0.0 {
+            return 1.0;
+        }
         (passage.difference / sum * (bracket.to_f64() / sum)).clamp(-1.0, 1.0)
     }
 }
@@ -198,13 +217,21 @@ impl Passage {
     }
 
     fn q_minus_p(self) -> f64 {
-        if self.is_open() { 0.0 } else { self.difference / (self.p + self.q) }
+        let sum = self.p + self.q;
+        if self.is_open() || sum == 0.0 { 0.0 } else { self.difference / sum }
     }
 
     /// rs = -D/(p + q)².
     fn amplitude_s(self) -> f64 {
         let sum = self.p + self.q;
-        if self.is_open() { 0.0 } else { (-(self.difference / sum) / sum).clamp(-1.0, 1.0) }
+        if self.is_open() {
+            0.0
+        } else if sum == 0.0 {
+            // Grazing, beyond the range of doubles.
+            1.0
+        } else {
+            (-(self.difference / sum) / sum).clamp(-1.0, 1.0)
+        }
     }
 }
 
