@@ -70,6 +70,8 @@ pub enum DomainError {
         /// The body's radius.
         radius_m: f64,
     },
+    /// A source and an occluder of which neither is in front of the other.
+    Interpenetrating,
     /// A polygon of fewer than three distinct vertices.
     TooFewVertices {
         /// How many distinct ones there are.
@@ -121,6 +123,9 @@ impl fmt::Display for DomainError {
                 "the receiver is {distance_m} m from the centre of the {shape} of radius \
                  {radius_m} m, expected a point outside"
             ),
+            Self::Interpenetrating => {
+                write!(f, "source and occluder penetrate each other, expected bodies apart")
+            }
             Self::TooFewVertices { distinct } => {
                 write!(f, "the polygon has {distinct} distinct vertices, expected 3 or more")
             }

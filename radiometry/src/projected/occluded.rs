@@ -5,6 +5,8 @@
 //! occluder's and of the horizon. Its projected solid angle is ½ ∮ n·((u - u₀) × du) over them, a sum
 //! in which the arcs need not even be in order: each is kept or dropped by what lies beside it. Circles and straight edges are exact; a disk's rim is integrated.
 
+use core::cmp::Ordering;
+
 use glam::DVec3;
 
 use super::outline::Curve;
@@ -47,8 +49,8 @@ pub enum Occluder {
 }
 
 /// Projected solid angle, sr, of the part of a source above the horizon that an opaque body leaves
-/// visible: 0 in the umbra, the whole source's where nothing is hidden. The bodies must not touch one
-/// another; one behind the source hides nothing. The relative tolerance refers to the unoccluded
+/// visible: 0 in the umbra, the whole source's where nothing is hidden. A body behind the
+/// source hides nothing; bodies that penetrate each other are refused. The relative tolerance refers to the unoccluded
 /// source, since what a shadow leaves may be as small as it likes. Sim: baffles and shutters; the
 /// lecture's penumbra.
 ///
@@ -89,6 +91,9 @@ pub fn occluded(
         return Ok(unoccluded);
     };
     let normal = receiver.normal() / length(receiver.normal());
+    if shining.is_pierced_by(&hiding) {
+        return Err(DomainError::Interpenetrating.into());
+    }
     let scene = Scene::new(normal, shining, hiding);
     let visible = scene.visible(whole, tolerance)?;
     let estimate = match visible {
@@ -191,11 +196,19 @@ impl Scene {
         let (mut sum, mut magnitude) = (Sum::default(), 0.0);
         let (mut bound, mut evaluations) = (0.0, 0);
         let (mut kept, mut shadowed) = (0, false);
+        let (mut in_front, mut behind) = (false, false);
         let beside = (BESIDE * self.extent).max(16.0 * f64::EPSILON);
         for (owner, curve) in self.curves() {
             for [from, to] in self.pieces(owner, curve) {
                 let (direction, left) = curve.direction_and_left(LOOK_AT.mul_add(to - from, from));
                 let (inner, outer) = (direction + left * beside, direction - left * beside);
+                for probe in [inner, outer] {
+                    match self.order(probe) {
+                        Some(Ordering::Less) => in_front = true,
+                        Some(Ordering::Greater) => behind = true,
+                        _ => {}
+                    }
+                }
                 let verdict = self.verdict(owner, inner, outer);
                 shadowed |=
                     verdict == Verdict::Shadow || (owner == Some(1) && verdict == Verdict::Kept);
@@ -210,6 +223,9 @@ impl Scene {
                 evaluations += arc.evaluations;
                 kept += 1;
             }
+        }
+        if in_front && behind {
+            return Err(DomainError::Interpenetrating.into());
         }
         if !shadowed {
             return Ok(Visible::All);
@@ -237,8 +253,9 @@ impl Scene {
         let bodies = [(None, &self.source), (Some(0), &self.hiding[0]), (Some(1), &self.hiding[1])];
         let others = bodies.into_iter().filter(|(body, _)| *body != owner);
         let limits = others.flat_map(|(_, seen)| &seen.limits);
+        let level = self.source.level_with(&self.hiding[1]);
         let mut ends: Vec<f64> =
-            limits.flat_map(|limit| curve.crossings(limit, self.extent)).collect();
+            limits.chain(&level).flat_map(|limit| curve.crossings(limit, self.extent)).collect();
         ends.sort_by(f64::total_cmp);
         if let (true, Some(first)) = (curve.is_closed(), ends.first().copied()) {
             // Once round, from the first crossing to itself.
@@ -266,6 +283,15 @@ impl Scene {
         // Through the source's inside, the one side hidden by this body, the other by none.
         let through = self.source.distance(outer).is_some() && self.hidden(body, inner);
         if through && !self.hidden(other, outer) { Verdict::Kept } else { Verdict::Dropped }
+    }
+
+    /// Whether the occluder is nearer or farther than the source, where both are seen and the
+    /// difference is no rounding.
+    fn order(&self, direction: DVec3) -> Option<Ordering> {
+        const ALIKE: f64 = 1e-9;
+        let near = self.hiding[1].distance(direction)?;
+        let far = self.source.distance(direction)?;
+        if (near - far).abs() <= ALIKE * far { None } else { near.partial_cmp(&far) }
     }
 
     /// Whether a body is there in front of the source.

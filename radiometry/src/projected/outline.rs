@@ -137,7 +137,8 @@ impl Curve {
         let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
         let (value, slope) = self.value_and_slope(limit, middle);
         let change = slope.abs() * half + bend * half * half / 2.0;
-        if value.abs() > change || value.abs() + change <= noise {
+        // Extremes of magnitude may leave no number to go by.
+        if !change.is_finite() || value.abs() > change || value.abs() + change <= noise {
             return;
         }
         if slope.abs() > bend * half {

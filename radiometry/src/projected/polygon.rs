@@ -189,7 +189,8 @@ fn mean_over(corners: [Spot; 3], depth: u32) -> f64 {
     if longest <= SHORT * distance {
         return gauss(corners, longest / distance);
     }
-    if depth == DEPTH_MAX {
+    // A corner at the receiver has no direction; the plane through it shows nothing.
+    if depth == DEPTH_MAX || distance <= 0.0 || !longest.is_finite() {
         return 0.0;
     }
     // Rotated so that the longest edge is the first.

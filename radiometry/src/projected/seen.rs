@@ -195,6 +195,63 @@ impl Seen {
     }
 }
 
+impl Seen {
+    /// Where the planes of two flat bodies are equally far away; none if one is not flat. Which of
+    /// them is nearer changes there alone.
+    pub(super) fn level_with(&self, other: &Self) -> Option<Limit> {
+        let ((normal, distance), (other_normal, other_distance)) = (self.plane()?, other.plane()?);
+        let normal = normalised(normal * other_distance - other_normal * distance)?;
+        Some(Limit::Plane { normal })
+    }
+
+    /// The unit normal away from the receiver, and the distance.
+    fn plane(&self) -> Option<(DVec3, f64)> {
+        match &self.fill {
+            Fill::Below { .. } | Fill::Sphere { .. } => None,
+            Fill::Disk { axis, distance, .. } => Some((*axis, *distance)),
+            Fill::Polygon { corners, normal } => Some((*normal, normal.dot(corners[0]))),
+            Fill::HalfPlane { z, .. } => Some((DVec3::Z * z.signum(), z.abs())),
+        }
+    }
+
+    /// Whether a sphere is closer to another body than its radius; false if neither is a sphere.
+    pub(super) fn is_pierced_by(&self, other: &Self) -> bool {
+        let ((Fill::Sphere { center, radius }, body) | (body, Fill::Sphere { center, radius })) =
+            (&self.fill, &other.fill)
+        else {
+            return false;
+        };
+        let distance = match body {
+            Fill::Below { .. } => return false,
+            Fill::Sphere { center: other, radius } => length(*other - *center) - radius,
+            Fill::Disk { center: middle, axis, radius, .. } => {
+                let apart = *center - *middle;
+                let above = axis.dot(apart);
+                let beside = length(apart - *axis * above);
+                libm::hypot(above, (beside - radius).max(0.0))
+            }
+            Fill::Polygon { corners, normal } => distance_to_polygon(*center, corners, *normal),
+            Fill::HalfPlane { x_max, z } => libm::hypot(center.z - z, (center.x - x_max).max(0.0)),
+        };
+        // Bodies that touch are apart.
+        distance < radius * (1.0 - 1e-9)
+    }
+}
+
+fn distance_to_polygon(point: DVec3, corners: &[DVec3], normal: DVec3) -> f64 {
+    let around: Vec<DVec3> = corners.iter().map(|corner| *corner - point).collect();
+    if surrounds(&around, normal, normal) {
+        return normal.dot(around[0]).abs();
+    }
+    let to_edge = |(i, a): (usize, &DVec3)| {
+        let edge = around[(i + 1) % around.len()] - *a;
+        let square = edge.length_squared();
+        let part = if square > 0.0 { (-a.dot(edge) / square).clamp(0.0, 1.0) } else { 0.0 };
+        length(*a + edge * part)
+    };
+    around.iter().enumerate().map(to_edge).fold(f64::INFINITY, f64::min)
+}
+
 /// Whether a polygon that faces the receiver has the direction inside it: how often the edges'
 /// planes are crossed on the way to one side.
 fn surrounds(corners: &[DVec3], direction: DVec3, normal: DVec3) -> bool {
