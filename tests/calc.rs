@@ -40,7 +40,7 @@ fn every_reference_case_is_met_and_within_its_error_bound() {
 }
 
 /// How many reference cases are answered: it only grows.
-const ROWS_MET: usize = 419;
+const ROWS_MET: usize = 540;
 
 /// What is wrong with an answer, if anything is.
 fn miss(case: &Value, answer: &Value) -> Option<String> {

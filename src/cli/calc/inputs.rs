@@ -1,7 +1,7 @@
 //! The inputs of one request, read strictly: a number is a finite number, a vector three of them,
 //! and no key is passed over. What the numbers mean is not known here.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde_json::{Map, Value};
 
 use super::quantity::{Input, Refusal};
@@ -83,6 +83,13 @@ impl<'a> Inputs<'a> {
         Ok(vector)
     }
 
+    /// Two finite numbers.
+    pub(super) fn point_2d(self, name: &str) -> Result<DVec2, Refusal> {
+        let (name, value) = self.value(name)?;
+        let [x, y] = as_array((name, value))?;
+        Ok(DVec2::new(x, y))
+    }
+
     /// A list of vectors.
     pub(super) fn vectors(self, name: &str) -> Result<Vec<DVec3>, Refusal> {
         self.list(name)?.iter().map(|value| as_vector((name, value))).collect()
@@ -117,6 +124,14 @@ impl<'a> Inputs<'a> {
     pub(super) fn object(self, name: &str) -> Result<Inputs<'a>, Refusal> {
         let (name, value) = self.value(name)?;
         value.as_object().map(Inputs).ok_or_else(|| wrong((name, value), "an object"))
+    }
+
+    /// A list of named values.
+    pub(super) fn objects(self, name: &str) -> Result<Vec<Inputs<'a>>, Refusal> {
+        let object = |value: &'a Value| {
+            value.as_object().map(Inputs).ok_or_else(|| wrong((name, value), "an object"))
+        };
+        self.list(name)?.iter().map(object).collect()
     }
 
     /// A word.

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use radiometry::chart::{Environment, Perpendicular, Surface, TwoPlane};
+use radiometry::convex::{self, ConvexBody};
 use radiometry::quantity::{ProjectedSolidAngle, Radiance};
 use radiometry::throughput;
 
@@ -12,6 +13,10 @@ use super::quantity::{Input, Quantity, Refusal, Rounding};
 const ROUNDING: Rounding = Rounding::Relative(4e-15);
 
 const THETA: Input = Input::new("theta", "rad, from the normal");
+const BODY: Input = Input::new(
+    "shape",
+    "{kind: sphere | box | cylinder | cone | ellipsoid, radius, height | a, b, c}, closed, m",
+);
 const RADIANCE: Input = Input::new("radiance", "W/(m² sr)");
 
 pub(super) const QUANTITIES: &[Quantity] = &[
@@ -25,6 +30,22 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             let (r1, r2) = (inputs.number("r1")?, inputs.number("r2")?);
             Ok(throughput::coaxial_disks(r1, r2, inputs.number("h")?)?.m2_sr().into())
         },
+    },
+    Quantity {
+        name: "mean-projected-area",
+        inputs: &[BODY],
+        unit: "m²",
+        example: "--shape {\"kind\":\"sphere\",\"radius\":1.5}",
+        rounding: Rounding::Relative(1e-12),
+        compute: |inputs| Ok(convex::mean_projected_area(body(inputs)?)?.m2().into()),
+    },
+    Quantity {
+        name: "throughput-convex-body",
+        inputs: &[BODY],
+        unit: "m² sr",
+        example: "--shape {\"kind\":\"box\",\"a\":1,\"b\":2,\"c\":3}",
+        rounding: Rounding::Relative(1e-12),
+        compute: |inputs| Ok(convex::throughput(body(inputs)?)?.m2_sr().into()),
     },
     Quantity {
         name: "chart-density-surface",
@@ -109,6 +130,30 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         },
     },
 ];
+
+/// A closed convex body.
+fn body(inputs: Inputs<'_>) -> Result<ConvexBody, Refusal> {
+    let shape = inputs.object("shape")?;
+    let kind = shape.text("kind")?;
+    let sizes: &[&'static str] = match kind {
+        "sphere" => &["radius"],
+        "box" | "ellipsoid" => &["a", "b", "c"],
+        "cylinder" | "cone" => &["radius", "height"],
+        other => return Err(Refusal::new(format!("the shape kind `{other}` is not known"))),
+    };
+    let keys: Vec<Input> = ["kind"].iter().chain(sizes).map(|key| Input::new(key, "m")).collect();
+    shape.expect_only(&keys)?;
+    let edges = || Ok::<_, Refusal>([shape.number("a")?, shape.number("b")?, shape.number("c")?]);
+    let radius = || shape.number("radius");
+    let height = || shape.number("height");
+    Ok(match kind {
+        "sphere" => ConvexBody::Sphere { radius_m: radius()? },
+        "box" => ConvexBody::Box { edges_m: edges()? },
+        "ellipsoid" => ConvexBody::Ellipsoid { semi_axes_m: edges()? },
+        "cylinder" => ConvexBody::Cylinder { radius_m: radius()?, height_m: height()? },
+        _ => ConvexBody::Cone { radius_m: radius()?, height_m: height()? },
+    })
+}
 
 fn radiance(inputs: Inputs<'_>) -> Result<Radiance, Refusal> {
     Ok(Radiance::from_w_per_m2_sr(between(inputs, "radiance", 0.0, f64::MAX)?))

@@ -4,6 +4,7 @@
 
 mod angles;
 mod bases;
+mod form_factors;
 mod inputs;
 mod interfaces;
 mod least_squares;

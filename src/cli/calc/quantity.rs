@@ -9,13 +9,15 @@ use serde_json::{Value, json};
 
 use super::inputs::Inputs;
 use super::{
-    angles, bases, interfaces, least_squares, light, motion, rays, solid_angles, statistics,
+    angles, bases, form_factors, interfaces, least_squares, light, motion, rays, solid_angles,
+    statistics,
 };
 
 /// The families, in the order in which they are listed.
 const FAMILIES: &[&[Quantity]] = &[
     angles::QUANTITIES,
     solid_angles::QUANTITIES,
+    form_factors::QUANTITIES,
     light::QUANTITIES,
     interfaces::QUANTITIES,
     rays::QUANTITIES,
