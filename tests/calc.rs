@@ -29,7 +29,7 @@ fn every_reference_case_is_met_and_within_its_error_bound() {
         let answer = ask(quantity, &case["inputs"]);
         match miss(&case, &answer) {
             Some(why) => {
-                misses.push(format!("{} {quantity}: {why} ({})", case["id"], case["note"]))
+                misses.push(format!("{} {quantity}: {why} ({})", case["id"], case["note"]));
             }
             None => *met.entry(quantity.to_owned()).or_default() += 1,
         }

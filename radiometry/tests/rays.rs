@@ -314,14 +314,14 @@ fn harmonics_are_orthonormal() {
         for spoke in 0..spokes {
             let phi = 2.0 * PI * spoke as f64 / spokes as f64;
             for (gram, z, is_half) in
-                [(0, node, false), (1, (1.0 + node) / 2.0, true)].map(|(g, z, h)| (g, z, h))
+                [(0, node, false), (1, f64::midpoint(1.0, node), true)].map(|(g, z, h)| (g, z, h))
             {
                 let sin = ((1.0 - z) * (1.0 + z)).sqrt();
                 let at = DVec3::new(sin * phi.cos(), sin * phi.sin(), z);
                 if is_half {
-                    half.evaluate(at, &mut values)
+                    half.evaluate(at, &mut values);
                 } else {
-                    whole.evaluate(at, &mut values)
+                    whole.evaluate(at, &mut values);
                 }
                 let solid_angle =
                     weight * 2.0 * PI / spokes as f64 * if is_half { 0.5 } else { 1.0 };

@@ -95,7 +95,7 @@ fn unwrap(inputs: Inputs<'_>) -> Result<Answer, Refusal> {
         }
         let mut value = start;
         for _ in 0..count {
-            micros = unwrapper.unwrap(Tick(value as u32));
+            micros = unwrapper.unwrap(tick(value as f64)?);
             value = (value + step).rem_euclid(word + 1);
         }
     }
@@ -108,5 +108,10 @@ fn tick(value: f64) -> Result<Tick, Refusal> {
         let expected = "expected whole microseconds below 2^32";
         return Err(Refusal::new(format!("a tick is {number}, {expected}")));
     }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whole, and in range"
+    )]
     Ok(Tick(value as u32))
 }
