@@ -12,7 +12,7 @@
 //! use radiometry::ray::Ray;
 //! let ray = Ray::new(DVec3::new(-1e8, 0.5, 0.0), DVec3::X)?;
 //! // From 100 000 km: 1e8 - √3/2.
-//! assert_eq!(ray.sphere(DVec3::ZERO, 1.0)?, Some(99_999_999.133_974_6));
+//! assert_eq!(ray.sphere(DVec3::ZERO, 1.0)?, Some(99_999_999.133_974_61));
 //! assert_eq!(ray.sphere(DVec3::ZERO, 0.499_999_999_999_999_9)?, None);
 //! # Ok::<(), radiometry::DomainError>(())
 //! ```
