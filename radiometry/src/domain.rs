@@ -32,6 +32,11 @@ pub enum DomainError {
         /// The quantity and its unit.
         result: &'static str,
     },
+    /// The arguments are so far apart in size that no digit is left. Bring them closer.
+    Lost {
+        /// The quantity and its unit.
+        result: &'static str,
+    },
     /// Outside a closed interval.
     Outside {
         /// The argument and its unit.
@@ -104,6 +109,9 @@ impl fmt::Display for DomainError {
             }
             Self::NotPositive { argument, value } => {
                 write!(f, "{argument} is {value}, expected more than 0")
+            }
+            Self::Lost { result } => {
+                write!(f, "{result} has no digits at arguments so far apart in size")
             }
             Self::Overflow { result } => write!(f, "{result} is beyond the largest double"),
             Self::Outside { argument, value, low, high } => {

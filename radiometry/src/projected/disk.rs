@@ -38,7 +38,7 @@ pub fn disk(receiver: &Receiver, disk: &Disk) -> Result<ProjectedSolidAngle, Dom
             Err(DomainError::Touching { shape: "disk" })
         };
     }
-    Ok(of_hemisphere(view.projected()))
+    of_hemisphere(view.projected())
 }
 
 /// Projected solid angle of a disk parallel to the receiver, `distance_m` above it, its axis
@@ -68,7 +68,7 @@ pub fn disk_parallel(
     let scale = |length: f64| libm::scalbn(length, -unit);
     let (radius, distance, offset) = (scale(radius), scale(distance), scale(offset));
     let view = View { offset, ..View::on_axis(radius, distance, 1.0, 0.0) };
-    Ok(of_hemisphere(view.uncut()))
+    of_hemisphere(view.uncut())
 }
 
 /// Projected solid angle of a disk whose axis goes through the receiver, the receiver's normal at
@@ -100,7 +100,7 @@ pub fn disk_tilted(
     let (sin, cos) = libm::sincos(angle);
     let scale = |length: f64| libm::scalbn(length, -unit);
     let view = View::on_axis(scale(radius), scale(distance), cos, sin);
-    Ok(of_hemisphere(view.projected()))
+    of_hemisphere(view.projected())
 }
 
 /// The disk as the receiver sees it, lengths in one unit. m: the disk's axis, pointing away from the

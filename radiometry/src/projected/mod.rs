@@ -49,8 +49,11 @@ impl Receiver {
     }
 }
 
-/// No more than the hemisphere: the kernels' last rounding may lie beyond it, nothing else.
-fn of_hemisphere(sr: f64) -> ProjectedSolidAngle {
-    debug_assert!((-1e-9..PI + 1e-9).contains(&sr), "{sr} sr");
-    ProjectedSolidAngle::from_sr(sr.clamp(0.0, PI))
+/// No more than the hemisphere: the kernels' last rounding may lie beyond it, nothing else. A
+/// kernel that lost itself between the extremes of its arguments has no answer.
+fn of_hemisphere(sr: f64) -> Result<ProjectedSolidAngle, DomainError> {
+    if (-1e-9..PI + 1e-9).contains(&sr) {
+        return Ok(ProjectedSolidAngle::from_sr(sr.clamp(0.0, PI)));
+    }
+    Err(DomainError::Lost { result: "projected solid angle (sr)" })
 }

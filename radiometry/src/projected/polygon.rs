@@ -6,6 +6,8 @@
 //! large as the area: what is small, far or near the horizon loses its digits (Baum, Rushmeier and
 //! Winget 1989 switch the other way, from the integral to the formula when near).
 
+use std::cell::Cell;
+
 use glam::DVec3;
 
 use super::{Receiver, of_hemisphere};
@@ -18,6 +20,8 @@ use crate::wide::{WideVec, in_units, length, unit_exponent};
 
 /// How much larger than their sum the terms of Lambert's formula may be: it costs so many ulp.
 const CANCELLATION: f64 = 32.0;
+/// Triangles that the integral may look at: slivers of 1e8 take some thousand.
+const CELLS_MAX: u32 = 100_000;
 
 /// Projected solid angle of a polygon, convex or not, in any position; 0 from its plane outside it.
 /// Its vertices on the horizon count as visible. Refused: a receiver in the polygon itself. Rig: a
@@ -50,7 +54,7 @@ pub fn polygon(receiver: &Receiver, polygon: &Polygon) -> Result<ProjectedSolidA
     let normal_length = length(receiver.normal());
     let (sum, magnitude) = lambert(receiver.normal(), &visible)?;
     let twice = if sum.abs() * CANCELLATION >= magnitude { sum } else { 2.0 * integral(&visible) };
-    Ok(of_hemisphere((twice / normal_length).abs() / 2.0))
+    of_hemisphere((twice / normal_length).abs() / 2.0)
 }
 
 /// A vertex as the receiver sees it, in units of the largest coordinate.
@@ -156,9 +160,10 @@ fn integral(corners: &[Corner]) -> f64 {
         .map(|corner| Spot { position: corner.position.to_vec(), height: corner.height.to_f64() })
         .collect();
     let mut sum = Sum::default();
+    let cells_left = Cell::new(CELLS_MAX);
     for (volume, pair) in volumes(corners).zip(spots.windows(2)) {
         if volume != 0.0 {
-            sum.add(volume * mean_over([spots[0], pair[0], pair[1]], 0));
+            sum.add(volume * mean_over([spots[0], pair[0], pair[1]], 0, &cells_left));
         }
     }
     sum.value()
@@ -172,12 +177,16 @@ struct Spot {
 }
 
 /// ∫ z/r⁴ over the unit simplex of a triangle's barycentric coordinates, halving the longest edge
-/// until it is short as seen from the receiver.
-fn mean_over(corners: [Spot; 3], depth: u32) -> f64 {
+/// until it is short as seen from the receiver. NaN where that takes too many.
+fn mean_over(corners: [Spot; 3], depth: u32, cells_left: &Cell<u32>) -> f64 {
     /// Of an edge by the distance: 12 x 12 Gauss points then leave rounding alone.
     const SHORT: f64 = 0.5;
     /// Halvings of the area after which the rest of it cannot matter.
     const DEPTH_MAX: u32 = 160;
+    if cells_left.get() == 0 {
+        return f64::NAN;
+    }
+    cells_left.set(cells_left.get() - 1);
     let [a, b, c] = corners;
     let (ab, bc, ca) = (
         length(b.position - a.position),
@@ -206,7 +215,7 @@ fn mean_over(corners: [Spot; 3], depth: u32) -> f64 {
         height: f64::midpoint(a.height, b.height),
     };
     let halves = [[a, middle, c], [middle, b, c]];
-    halves.into_iter().map(|half| mean_over(half, depth + 1)).sum::<f64>() / 2.0
+    halves.into_iter().map(|half| mean_over(half, depth + 1, cells_left)).sum::<f64>() / 2.0
 }
 
 /// The product rule on a triangle collapsed from a square; fewer points the smaller it looks.

@@ -2,6 +2,7 @@
 //! they and their halves disagree. It is for kernels whose integrand is known to be such; anything
 //! else wants a tolerance and an error bound.
 
+use std::cell::Cell;
 use std::sync::OnceLock;
 
 use crate::quadrature::gauss_legendre;
@@ -10,13 +11,24 @@ use crate::quadrature::gauss_legendre;
 const AGREEMENT: f64 = 1e-13;
 /// Halvings: no scale of a double's is finer, seen from a well placed origin.
 const DEPTH_MAX: u32 = 60;
+/// Halvings in all: a smooth integrand takes some hundred. One that asks for more has lost its
+/// digits to the extremes of its arguments.
+const HALVINGS_MAX: u32 = 20_000;
 
-/// ∫ f over [from, to]; 0 if the interval is empty.
+/// ∫ f over [from, to]; 0 if the interval is empty, NaN where it does not settle.
 pub(super) fn integral(from: f64, to: f64, f: &impl Fn(f64) -> f64) -> f64 {
     if from >= to {
         return 0.0;
     }
-    halved(from, to, panel(from, to, f), 0.0, 0, f)
+    let halvings_left = Cell::new(HALVINGS_MAX);
+    halved(from, to, panel(from, to, f), 0.0, 0, &|| spend(&halvings_left), f)
+}
+
+/// Whether another halving may be made.
+fn spend(halvings_left: &Cell<u32>) -> bool {
+    let left = halvings_left.get();
+    halvings_left.set(left.saturating_sub(1));
+    left > 0
 }
 
 /// `elsewhere` is a lower bound of the integral over other panels: what does not matter beside it
@@ -27,8 +39,12 @@ fn halved(
     whole: f64,
     elsewhere: f64,
     depth: u32,
+    may_halve: &impl Fn() -> bool,
     f: &impl Fn(f64) -> f64,
 ) -> f64 {
+    if !whole.is_finite() || !may_halve() {
+        return f64::NAN;
+    }
     let middle = f64::midpoint(from, to);
     let (left, right) = (panel(from, middle, f), panel(middle, to, f));
     let sum = left + right;
@@ -36,8 +52,8 @@ fn halved(
     if settled || depth == DEPTH_MAX {
         return sum;
     }
-    let left = halved(from, middle, left, elsewhere, depth + 1, f);
-    left + halved(middle, to, right, elsewhere + left, depth + 1, f)
+    let left = halved(from, middle, left, elsewhere, depth + 1, may_halve, f);
+    left + halved(middle, to, right, elsewhere + left, depth + 1, may_halve, f)
 }
 
 fn panel(from: f64, to: f64, f: &impl Fn(f64) -> f64) -> f64 {

@@ -33,7 +33,7 @@ pub fn sphere(receiver: &Receiver, sphere: &Sphere) -> Result<ProjectedSolidAngl
         return Ok(ProjectedSolidAngle::ZERO);
     }
     let cap = Cap::seen(receiver, sphere)?;
-    Ok(of_hemisphere(cap.projected()))
+    of_hemisphere(cap.projected())
 }
 
 /// The same from the sphere's radius, the distance of its centre and the angle in [0, π] between the
@@ -67,7 +67,7 @@ pub fn sphere_tilted(
         sin_elevation: cos_angle,
         cos_elevation: sin_angle,
     };
-    Ok(of_hemisphere(cap.projected()))
+    of_hemisphere(cap.projected())
 }
 
 /// A cap of directions, by the sines and cosines of its half angle and of its centre's elevation.

@@ -1,0 +1,71 @@
+//! Whatever the size of its arguments, a projected solid angle is a number within the hemisphere
+//! or an error, and soon.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use proptest::prelude::*;
+use radiometry::projected::{self, Receiver};
+use radiometry::quantity::ProjectedSolidAngle;
+use radiometry::shape::{Disk, Polygon, Sphere};
+use radiometry::{DomainError, solid_angle};
+
+fn number() -> impl Strategy<Value = f64> {
+    let extremes = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        f64::MAX,
+        -f64::MAX,
+        f64::MIN_POSITIVE,
+        5e-324,
+        1e300,
+        1e-300,
+        f64::NAN,
+        f64::INFINITY,
+    ];
+    prop_oneof![
+        prop::sample::select(extremes.to_vec()),
+        -2.0..2.0_f64,
+        (-300..300_i32, -1.0..1.0_f64).prop_map(|(exponent, x)| x * 10_f64.powi(exponent)),
+    ]
+}
+
+fn anything() -> impl Strategy<Value = DVec3> {
+    [number(), number(), number()].prop_map(DVec3::from_array)
+}
+
+fn in_range(found: Result<ProjectedSolidAngle, DomainError>) {
+    if let Ok(found) = found {
+        assert!((0.0..=PI).contains(&found.sr()), "{found:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1500) })]
+
+    #[test]
+    fn anything_at_all_gives_a_number_in_range_or_an_error(
+        point in anything(), normal in anything(), center in anything(), axis in anything(),
+        radius in number(), corners in prop::collection::vec(anything(), 0..6),
+        distance in number(), angle in number(),
+    ) {
+        in_range(projected::disk_parallel(radius, distance, angle));
+        in_range(projected::disk_tilted(radius, distance, angle));
+        in_range(projected::sphere_tilted(radius, distance, angle));
+        if let Ok(signed) = solid_angle::triangle_signed(point, center, axis, normal) {
+            prop_assert!(signed.sr().abs() <= 2.0 * PI);
+        }
+        let Ok(at) = Receiver::new(point, normal) else { return Ok(()) };
+        if let Ok(disk) = Disk::new(center, axis, radius) {
+            in_range(projected::disk(&at, &disk));
+        }
+        if let Ok(sphere) = Sphere::new(center, radius) {
+            in_range(projected::sphere(&at, &sphere));
+        }
+        if let Ok(polygon) = Polygon::new(corners) {
+            in_range(projected::polygon(&at, &polygon));
+        }
+    }
+}
