@@ -7,6 +7,7 @@
 //! `cargo run --release -p benches --bin coverage -- --doc docs/measured.md --date 2026-11-22`.
 
 mod arguments;
+mod cases;
 mod counted;
 mod dice;
 mod document;
@@ -17,6 +18,7 @@ mod stopwatch;
 mod table;
 
 pub use arguments::Arguments;
+pub use cases::{cases, cases_of};
 pub use counted::{Bytes, Counted};
 pub use dice::Dice;
 pub use document::Section;
