@@ -89,6 +89,35 @@ pub enum DomainError {
         /// Its distance from that plane.
         off_plane_m: f64,
     },
+    /// A sequence that has to rise, or stay, falls.
+    Falling {
+        /// Which sequence.
+        argument: &'static str,
+        /// Where, counted from 0.
+        index: usize,
+        /// What stands there.
+        value: f64,
+        /// What stands before it.
+        before: f64,
+    },
+    /// A knot that stands more often than a spline of its degree can answer.
+    Repeated {
+        /// The knot.
+        knot: f64,
+        /// How often it stands there, repetitions at clamped ends included.
+        times: usize,
+        /// How often it may.
+        most: usize,
+    },
+    /// Too short a list.
+    TooFew {
+        /// Which list.
+        argument: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there have to be.
+        least: usize,
+    },
     /// A polygon two of whose edges cross.
     SelfIntersecting {
         /// One edge, by its first vertex, counted from 0.
@@ -142,6 +171,16 @@ impl fmt::Display for DomainError {
                 "vertex {vertex} is {off_plane_m} m off the polygon's plane, expected vertices in \
                  one plane"
             ),
+            Self::Falling { argument, index, value, before } => write!(
+                f,
+                "number {index} of {argument} is {value} after {before}, expected no less than that"
+            ),
+            Self::Repeated { knot, times, most } => {
+                write!(f, "the knot {knot} stands {times} times, expected at most {most}")
+            }
+            Self::TooFew { argument, found, least } => {
+                write!(f, "{found} {argument} are given, expected {least} or more")
+            }
             Self::SelfIntersecting { edge, other } => write!(
                 f,
                 "the edges from vertex {edge} and from vertex {other} cross, expected a simple \
