@@ -163,6 +163,26 @@ fn sizes_below_zero_and_normals_of_no_length_are_refused() {
     }
 }
 
+#[test]
+fn a_radius_of_zero_has_a_value() {
+    for (name, inputs) in one_of_each() {
+        for key in ["radius", "r", "r1", "r2"] {
+            // An outer sphere of no radius would be within the inner one.
+            let is_inside_out = name == "form-factor-concentric-spheres" && key == "r2";
+            if is_inside_out || !inputs[key].is_number() {
+                continue;
+            }
+            let answer = ask(&name, &spoiled(&inputs, key, Some(json!(0.0))));
+            assert!(answer.get("value").is_some(), "{name} with {key} = 0: {answer}");
+        }
+        if inputs["shape"]["radius"].is_number() {
+            let mut shape = inputs.clone();
+            shape["shape"]["radius"] = json!(0.0);
+            assert_eq!(ask(&name, &shape)["value"], 0.0, "{name}");
+        }
+    }
+}
+
 /// Integrals: at such sizes one may spend its whole budget, which takes minutes unoptimised.
 fn is_integrated(name: &str) -> bool {
     name.starts_with("occluded")

@@ -6,10 +6,10 @@
 
 use core::f64::consts::PI;
 
-use crate::domain::{DomainError, positive};
+use crate::domain::{DomainError, not_negative};
 use crate::quantity::{Area, ProjectedArea, Throughput};
 
-/// A closed convex body; lengths in metres, positive.
+/// A closed convex body; lengths in metres, not negative. A flat one has two faces, a line no area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ConvexBody {
     /// A ball.
@@ -89,23 +89,23 @@ pub fn throughput(body: ConvexBody) -> Result<Throughput, DomainError> {
 pub fn surface_area(body: ConvexBody) -> Result<Area, DomainError> {
     let area = match body {
         ConvexBody::Sphere { radius_m } => {
-            let r = positive("radius_m", radius_m)?;
+            let r = not_negative("radius_m", radius_m)?;
             4.0 * PI * r * r
         }
         ConvexBody::Box { edges_m } => {
-            let [a, b, c] = all_positive("edges_m", edges_m)?;
+            let [a, b, c] = none_negative("edges_m", edges_m)?;
             2.0 * (a * b + b * c + c * a)
         }
         ConvexBody::Cylinder { radius_m, height_m } => {
-            let (r, h) = (positive("radius_m", radius_m)?, positive("height_m", height_m)?);
+            let (r, h) = (not_negative("radius_m", radius_m)?, not_negative("height_m", height_m)?);
             2.0 * PI * r * (r + h)
         }
         ConvexBody::Cone { radius_m, height_m } => {
-            let (r, h) = (positive("radius_m", radius_m)?, positive("height_m", height_m)?);
+            let (r, h) = (not_negative("radius_m", radius_m)?, not_negative("height_m", height_m)?);
             PI * r * (r + libm::hypot(r, h))
         }
         ConvexBody::Ellipsoid { semi_axes_m } => {
-            ellipsoid(all_positive("semi_axes_m", semi_axes_m)?)
+            ellipsoid(none_negative("semi_axes_m", semi_axes_m)?)
         }
     };
     if area.is_finite() {
@@ -115,9 +115,9 @@ pub fn surface_area(body: ConvexBody) -> Result<Area, DomainError> {
     }
 }
 
-fn all_positive(argument: &'static str, lengths: [f64; 3]) -> Result<[f64; 3], DomainError> {
+fn none_negative(argument: &'static str, lengths: [f64; 3]) -> Result<[f64; 3], DomainError> {
     for length in lengths {
-        positive(argument, length)?;
+        not_negative(argument, length)?;
     }
     Ok(lengths)
 }
@@ -126,6 +126,9 @@ fn all_positive(argument: &'static str, lengths: [f64; 3]) -> Result<[f64; 3], D
 fn ellipsoid(mut semi_axes: [f64; 3]) -> f64 {
     semi_axes.sort_by(f64::total_cmp);
     let [c, b, a] = semi_axes;
+    if b == 0.0 {
+        return 0.0;
+    }
     4.0 * PI * a * b * carlson_g((c / a) * (c / a), (c / b) * (c / b))
 }
 
@@ -200,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_body_without_extent_is_refused() {
-        assert!(surface_area(ConvexBody::Sphere { radius_m: 0.0 }).is_err());
+        assert!(surface_area(ConvexBody::Sphere { radius_m: -1.0 }).is_err());
         assert!(surface_area(ConvexBody::Box { edges_m: [1.0, f64::NAN, 1.0] }).is_err());
         assert!(throughput(ConvexBody::Sphere { radius_m: 1e160 }).is_err());
     }

@@ -3,10 +3,11 @@
 
 use core::f64::consts::PI;
 
-use crate::domain::{DomainError, positive};
+use crate::domain::{DomainError, not_negative, positive};
 use crate::quantity::{FormFactor, Throughput};
 
-/// Two parallel disks with one axis; all sizes positive and finite.
+/// Two parallel disks with one axis, apart. A disk may have no radius: nothing passes, and seen from
+/// that point the form factor is the other's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "the unit stands last in the name")]
 pub struct CoaxialDisks {
@@ -18,11 +19,11 @@ pub struct CoaxialDisks {
 /// How the throughput answers to its three lengths: first derivatives, m·sr.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThroughputPartials {
-    /// ∂T/∂r₁, positive.
+    /// ∂T/∂r₁, not negative.
     pub per_radius_1: f64,
-    /// ∂T/∂r₂, positive.
+    /// ∂T/∂r₂, not negative.
     pub per_radius_2: f64,
-    /// ∂T/∂h, negative.
+    /// ∂T/∂h, not positive.
     pub per_distance: f64,
 }
 
@@ -49,11 +50,11 @@ pub fn coaxial_disks(
 }
 
 impl CoaxialDisks {
-    /// The pair, if all three lengths are positive and finite.
+    /// The pair, if all three lengths are finite, the radii not negative and the distance positive.
     pub fn new(radius_1_m: f64, radius_2_m: f64, distance_m: f64) -> Result<Self, DomainError> {
         Ok(Self {
-            radius_1_m: positive("radius_1_m", radius_1_m)?,
-            radius_2_m: positive("radius_2_m", radius_2_m)?,
+            radius_1_m: not_negative("radius_1_m", radius_1_m)?,
+            radius_2_m: not_negative("radius_2_m", radius_2_m)?,
             distance_m: positive("distance_m", distance_m)?,
         })
     }

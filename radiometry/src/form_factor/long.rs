@@ -6,7 +6,7 @@ use core::f64::consts::PI;
 use glam::DVec2;
 
 use super::{form_factor, scaled};
-use crate::domain::{DomainError, finite, positive, within};
+use crate::domain::{DomainError, finite, not_negative, positive, within};
 use crate::error_free::DoubleDouble;
 use crate::quantity::FormFactor;
 
@@ -93,7 +93,7 @@ fn facing(argument: &'static str, start: f64, end: f64) -> Result<(), DomainErro
 }
 
 /// Between two equal, parallel, infinite cylinders (Howell C-63): (√(X²-1) + asin(1/X) - X)/π with
-/// X = d/2r, d the distance of the axes, 2r at least; rationalised.
+/// X = d/2r, d the distance of the axes, 2r at least; rationalised. 0 between lines.
 ///
 /// ```
 /// // In contact: ½ - 1/π.
@@ -102,8 +102,11 @@ fn facing(argument: &'static str, start: f64, end: f64) -> Result<(), DomainErro
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
 pub fn parallel_cylinders(radius_m: f64, axis_distance_m: f64) -> Result<FormFactor, DomainError> {
-    positive("radius_m", radius_m)?;
+    not_negative("radius_m", radius_m)?;
     within("axis_distance_m", axis_distance_m, 2.0 * radius_m, f64::MAX)?;
+    if radius_m == 0.0 {
+        return Ok(FormFactor::ZERO);
+    }
     let [radius, half] = scaled([radius_m / 2.0, axis_distance_m / 4.0]);
     let tangent = ((half - radius) * (half + radius)).sqrt();
     // √(X²-1) - X = -1/(X + √(X²-1))

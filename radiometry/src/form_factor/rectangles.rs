@@ -20,7 +20,8 @@ fn kernel() -> Tolerance {
     Tolerance::FINE.tightened(0.2)
 }
 
-/// Between two equal rectangles a x b, one right above the other at the distance c (Howell C-11).
+/// Between two equal rectangles a x b, one right above the other at the distance c (Howell C-11). 0
+/// between lines.
 ///
 /// ```
 /// // Opposite faces of a cube.
@@ -33,8 +34,12 @@ pub fn parallel_rectangles(
     side_b_m: f64,
     distance_m: f64,
 ) -> Result<FormFactor, EstimateError> {
-    let a = [0.0, positive("side_a_m", side_a_m)?];
-    let b = [0.0, positive("side_b_m", side_b_m)?];
+    let a = [0.0, not_negative("side_a_m", side_a_m)?];
+    let b = [0.0, not_negative("side_b_m", side_b_m)?];
+    if side_a_m == 0.0 || side_b_m == 0.0 {
+        positive("z_m", distance_m)?;
+        return Ok(FormFactor::ZERO);
+    }
     aligned_rectangles(a, b, a, b, distance_m)
 }
 
@@ -75,7 +80,8 @@ pub fn aligned_rectangles(
     Ok(form_factor(integral.value / (PI * area))?)
 }
 
-/// From the floor w x l to the wall h x l that stands on its edge l (Howell C-14).
+/// From the floor w x l to the wall h x l that stands on its edge l (Howell C-14). From the edge alone,
+/// a floor of no width, the wall fills half of the view.
 ///
 /// ```
 /// // Faces of a cube with a common edge.
@@ -88,9 +94,15 @@ pub fn perpendicular_rectangles(
     height_m: f64,
     edge_m: f64,
 ) -> Result<FormFactor, EstimateError> {
-    let edge = [0.0, positive("edge_m", edge_m)?];
-    let floor = [0.0, positive("width_m", width_m)?];
-    let wall = [0.0, positive("height_m", height_m)?];
+    let edge = [0.0, not_negative("edge_m", edge_m)?];
+    let floor = [0.0, not_negative("width_m", width_m)?];
+    let wall = [0.0, not_negative("height_m", height_m)?];
+    if edge_m == 0.0 || height_m == 0.0 {
+        return Ok(FormFactor::ZERO);
+    }
+    if width_m == 0.0 {
+        return Ok(FormFactor::from_ratio(0.5));
+    }
     perpendicular_offset_rectangles(floor, edge, wall, edge)
 }
 
@@ -135,7 +147,7 @@ pub fn perpendicular_offset_rectangles(
 /// given by its cosine, -1 (in one plane) up to below 1. As an integral over the direction β, across
 /// the edge, of the lines between the faces:
 /// ∫ sin β sin(φ+β) Q(R(β)) dβ/(π a sin φ), Q(R) = R atan(l/R) + (l/2) ln(1 + R²/l²), R the longest such
-/// line. Positive throughout.
+/// line. Positive throughout. From the edge alone, a = 0, it is (1 + cos φ)/2.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::{perpendicular_rectangles, wedge_rectangles}};
@@ -150,10 +162,16 @@ pub fn wedge_rectangles(
     cos_phi: f64,
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
-    positive("width_from_m", width_from_m)?;
-    positive("width_to_m", width_to_m)?;
-    positive("edge_m", edge_m)?;
+    not_negative("width_from_m", width_from_m)?;
+    not_negative("width_to_m", width_to_m)?;
+    not_negative("edge_m", edge_m)?;
     within("cos_phi", cos_phi, -1.0, 1.0 - f64::EPSILON / 2.0)?;
+    if width_to_m == 0.0 || edge_m == 0.0 {
+        return Ok(Estimate::closed(0.0, 0.0));
+    }
+    if width_from_m == 0.0 {
+        return Ok(Estimate::closed(0.5 * (1.0 + cos_phi), 2.0));
+    }
     let sin_phi = ((1.0 - cos_phi) * (1.0 + cos_phi)).sqrt();
     if sin_phi == 0.0 {
         return Ok(Estimate::closed(0.0, 0.0));

@@ -7,10 +7,11 @@ use crate::domain::{DomainError, not_negative, positive, within};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::quadrature::adaptive_between;
 use crate::quantity::FormFactor;
+use crate::solid_angle;
 use crate::throughput::CoaxialDisks;
 
 /// From disk 1 to disk 2, parallel and on one axis (Howell C-41); see
-/// [`CoaxialDisks::form_factor`].
+/// [`CoaxialDisks::form_factor`]. A disk 1 of no radius is a point that looks along the axis.
 ///
 /// ```
 /// let factor = radiometry::form_factor::coaxial_disks(1.0, 1.0, 1.0)?;
@@ -28,7 +29,7 @@ pub fn coaxial_disks(
 /// From disk 1 to disk 2 in parallel planes, the axes apart by an offset. Integral over the distance ρ
 /// from axis 2 of the factor of a point of disk 1, 2 r₂²h²/(B(B+A)) / 2 with A = h² + ρ² - r₂² and B
 /// the product of the slants to the nearest and the farthest rim point, over the arcs that disk 1
-/// has at ρ: positive throughout.
+/// has at ρ: positive throughout. A disk 1 of no radius is a point that looks along its axis.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::{coaxial_disks, parallel_disks}};
@@ -44,12 +45,16 @@ pub fn parallel_disks(
     offset_m: f64,
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
-    positive("radius_1_m", radius_1_m)?;
-    positive("radius_2_m", radius_2_m)?;
+    not_negative("radius_1_m", radius_1_m)?;
+    not_negative("radius_2_m", radius_2_m)?;
     positive("distance_m", distance_m)?;
     not_negative("offset_m", offset_m)?;
     let [radius_1, radius_2, distance, offset] =
         scaled([radius_1_m, radius_2_m, distance_m, offset_m].map(|length| length / 4.0));
+    if radius_1 == 0.0 || radius_2 == 0.0 {
+        let at_point = form_factor(disk_from_point(offset, radius_2, distance))?.ratio();
+        return Ok(Estimate::closed(at_point, 16.0));
+    }
     // The larger the disk that is looked at as a whole, the smoother the rest: by reciprocity.
     if radius_1 > radius_2 {
         let ratio = radius_2 / radius_1;
@@ -113,7 +118,8 @@ fn disk_from_point(rho: f64, radius: f64, distance: f64) -> f64 {
 }
 
 /// From a sphere to a disk whose axis goes through the sphere's centre, that at the distance h >= r₁
-/// from the disk (Howell C-44 kind): r₂²/(2s(s + h)), s = √(h² + r₂²), whatever the sphere's radius.
+/// from the disk (Howell C-44 kind): r₂²/(2s(s + h)), s = √(h² + r₂²), whatever the sphere's radius,
+/// 0 included.
 ///
 /// ```
 /// // The half space: ½ for a huge disk.
@@ -126,9 +132,11 @@ pub fn sphere_disk(
     distance_m: f64,
     disk_radius_m: f64,
 ) -> Result<FormFactor, DomainError> {
-    positive("sphere_radius_m", sphere_radius_m)?;
+    not_negative("sphere_radius_m", sphere_radius_m)?;
     within("distance_m", distance_m, sphere_radius_m, f64::MAX)?;
-    positive("disk_radius_m", disk_radius_m)?;
+    if not_negative("disk_radius_m", disk_radius_m)? == 0.0 {
+        return Ok(FormFactor::ZERO);
+    }
     let [distance, radius] = scaled([distance_m / 4.0, disk_radius_m / 4.0]);
     let slant = libm::hypot(distance, radius);
     form_factor(0.5 * (radius / slant) * (radius / (slant + distance)))
@@ -146,14 +154,14 @@ pub fn concentric_spheres(
     outer_radius_m: f64,
 ) -> Result<FormFactor, DomainError> {
     positive("outer_radius_m", outer_radius_m)?;
-    positive("inner_radius_m", inner_radius_m)?;
     let ratio = within("inner_radius_m", inner_radius_m, 0.0, outer_radius_m)? / outer_radius_m;
     form_factor(ratio * ratio)
 }
 
 /// From sphere 1 to sphere 2, apart or in contact. There is no elementary form. By Crofton's measure of
 /// lines: A₁F₁₂ = 2 ∫ sin γ S(d sin γ) dγ, S the area that the shadows of both spheres share along
-/// the directions at γ to the line of centres; positive throughout.
+/// the directions at γ to the line of centres; positive throughout. From a sphere of no radius it is
+/// the part of all directions that sphere 2 takes up.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::spheres};
@@ -168,9 +176,13 @@ pub fn spheres(
     center_distance_m: f64,
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
-    positive("radius_1_m", radius_1_m)?;
-    positive("radius_2_m", radius_2_m)?;
+    not_negative("radius_1_m", radius_1_m)?;
+    not_negative("radius_2_m", radius_2_m)?;
     within("center_distance_m", center_distance_m, radius_1_m + radius_2_m, f64::MAX)?;
+    if radius_1_m == 0.0 || radius_2_m == 0.0 {
+        let taken_up = solid_angle::sphere(radius_2_m, center_distance_m)?.sr() / (4.0 * PI);
+        return Ok(Estimate::closed(form_factor(taken_up)?.ratio(), 16.0));
+    }
     let [radius_1, radius_2, distance] =
         scaled([radius_1_m, radius_2_m, center_distance_m].map(|length| length / 4.0));
     let (sum, difference) = (radius_1 + radius_2, (radius_1 - radius_2).abs());

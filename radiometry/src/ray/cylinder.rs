@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Exact, Ray, cross_of, dot, dot_of, numbers};
-use crate::domain::{DomainError, finite_vector, positive};
+use crate::domain::{DomainError, finite_vector, not_negative};
 use crate::error_free::two_sum;
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
@@ -38,7 +38,7 @@ impl Ray {
     ) -> Result<Option<f64>, DomainError> {
         finite_vector("base", base)?;
         finite_vector("top", top)?;
-        let mut lengths = [positive("radius_m", radius_m)?];
+        let mut lengths = [not_negative("radius_m", radius_m)?];
         let local = self.local([base, top], &mut lengths);
         let scale = |length: f64| libm::scalbn(length, -local.exponent);
         let (from, to) = (base.to_array().map(scale), top.to_array().map(scale));
