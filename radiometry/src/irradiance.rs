@@ -4,7 +4,7 @@
 use crate::domain::{DomainError, positive};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::projected::{self, Occluder, Receiver, Source};
-use crate::quantity::{Exitance, Irradiance, ProjectedSolidAngle, Radiance};
+use crate::quantity::{Exitance, Irradiance, ProjectedSolidAngle, Radiance, Weighting};
 use crate::shape::{Disk, Polygon, Sphere};
 use crate::solid_angle;
 
@@ -20,11 +20,11 @@ use crate::solid_angle;
 /// assert!((found.w_per_m2() - 2.0 * std::f64::consts::PI).abs() < 1e-14);
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
-pub fn from_disk(
+pub fn from_disk<W: Weighting>(
     receiver: &Receiver,
     source: &Disk,
-    radiance: Radiance,
-) -> Result<Irradiance, DomainError> {
+    radiance: Radiance<W>,
+) -> Result<Irradiance<W>, DomainError> {
     Ok(radiance * projected::disk(receiver, source)?)
 }
 
@@ -40,11 +40,11 @@ pub fn from_disk(
 /// assert!((found.w_per_m2() - std::f64::consts::PI).abs() < 1e-15);
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
-pub fn from_sphere(
+pub fn from_sphere<W: Weighting>(
     receiver: &Receiver,
     source: &Sphere,
-    radiance: Radiance,
-) -> Result<Irradiance, DomainError> {
+    radiance: Radiance<W>,
+) -> Result<Irradiance<W>, DomainError> {
     Ok(radiance * projected::sphere(receiver, source)?)
 }
 
@@ -65,25 +65,25 @@ pub fn from_sphere(
 /// assert!((found.w_per_m2() - std::f64::consts::FRAC_PI_2).abs() < 1e-11);
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
-pub fn from_polygon(
+pub fn from_polygon<W: Weighting>(
     receiver: &Receiver,
     source: &Polygon,
-    radiance: Radiance,
-) -> Result<Irradiance, DomainError> {
+    radiance: Radiance<W>,
+) -> Result<Irradiance<W>, DomainError> {
     Ok(radiance * projected::polygon(receiver, source)?)
 }
 
-/// Irradiance, W·m⁻², from a source of uniform radiance behind an occluder; see
-/// [`projected::occluded`] for the tolerance.
-pub fn from_occluded(
+/// Irradiance, W·m⁻² (illuminance, lx, where a luminance is given), from a source of uniform radiance
+/// behind an occluder; see [`projected::occluded`] for the tolerance.
+pub fn from_occluded<W: Weighting>(
     receiver: &Receiver,
     source: &Source,
     occluder: &Occluder,
-    radiance: Radiance,
+    radiance: Radiance<W>,
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
     let projected = projected::occluded(receiver, source, occluder, tolerance)?;
-    Ok(projected.scaled(radiance.w_per_m2_sr()))
+    Ok(projected.scaled(radiance.amount()))
 }
 
 /// A uniformly bright Sun: the irradiance that it causes on a surface facing it, and the half angle
@@ -153,7 +153,7 @@ impl Sun {
 
     /// Of its surface, a diffuse emitter's: π L.
     pub fn exitance(&self) -> Exitance {
-        self.radiance().exitance_into(ProjectedSolidAngle::from_sr(core::f64::consts::PI))
+        self.radiance().exitance_into(ProjectedSolidAngle::HEMISPHERE)
     }
 }
 
