@@ -14,6 +14,8 @@ mod chance;
 mod compile;
 mod detector;
 mod effect;
+#[allow(dead_code, unused_imports)] // the compiler is about to call for it
+mod levels;
 mod mechanics;
 mod nominal;
 mod pty;
@@ -21,7 +23,11 @@ mod rows;
 mod scene;
 mod serve;
 mod simulated;
+#[allow(dead_code, unused_imports)] // the compiler is about to call for it
+mod stage;
 mod switches;
+#[allow(dead_code, unused_imports)] // the compiler is about to call for it
+mod time;
 mod truth;
 mod wire;
 
@@ -36,5 +42,6 @@ pub use scene::{
 };
 pub use serve::serve;
 pub use simulated::{LinkFaults, Simulated};
+pub use time::{MainsFlicker, SourceOverTime, WarmUp};
 pub use truth::{Peak, Region, Truth};
 pub use wire::Wire;
