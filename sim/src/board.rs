@@ -9,6 +9,7 @@ use crate::Compiled;
 use crate::chance::mix;
 use crate::detector::Stages;
 use crate::mechanics::{Axis, SeenRay, forward};
+use crate::optics;
 
 /// A simulated rig's hardware. It answers after the fact, so that a device core is woken when
 /// something ends and not for every ADC reading.
@@ -66,6 +67,10 @@ impl SimulatedBoard {
 
     /// The ray that the detector really sees.
     pub fn seen_ray(&self, now: Instant) -> SeenRay {
+        self.detector_axis(now).into()
+    }
+
+    fn detector_axis(&self, now: Instant) -> optics::Axis {
         forward(core::array::from_fn(|axis| self.axes[axis].value(now)))
     }
 
@@ -82,8 +87,7 @@ impl SimulatedBoard {
         let current_a = match self.dwell.illumination.shutter {
             Shutter::Closed => 0.0,
             Shutter::Open => {
-                let SeenRay { x_m, y_m, theta_rad, phi_rad } = self.seen_ray(now);
-                let radiance = self.compiled.scene.radiance(x_m, y_m, theta_rad, phi_rad);
+                let radiance = self.compiled.optics.radiance(&self.detector_axis(now));
                 radiance * self.compiled.current_per_radiance
             }
         };

@@ -1,33 +1,39 @@
-//! From a scene, a rig as stated and a seed to a rig as it is: every uncertain number drawn once,
-//! every effect that is called for turned into a stage, and a row written for each effect, in or
-//! out.
+//! From a scene, a rig as stated and the terms of a plan to a rig as it is: every effect weighed,
+//! what is chosen turned into stages, every uncertain number drawn once, and a row written for
+//! each effect, in or out.
+//!
+//! How a module takes part: it offers its candidates for a [`Setting`] (`candidates`), and builds
+//! what was [`Chosen`] of them. The order of the rows is that in which light and counts meet them.
 
-use core::f64::consts::PI;
 use core::fmt;
+use std::sync::Arc;
 
-use firmware_protocol::AXES_MAX;
 use radiometry::throughput::coaxial_disks;
 
 use crate::chance::draw;
-use crate::detector::{Amplifier, Stages};
-use crate::effect::EffectRow;
-use crate::mechanics::AxisTruth;
-use crate::rows;
-use crate::simulated::AXIS_NAMES;
-use crate::{Nominal, NominalDetector, Quantity, Region, Scene, Simulated, Truth};
+use crate::check::check;
+use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C, Stages};
+use crate::effect::{Chosen, EffectRow, decide};
+use crate::field::Field;
+use crate::mechanics::{self, AxisTruth};
+use crate::optics::{self, Optics};
+use crate::{Nominal, NominalDetector, Quantity, Region, Scene, Simulated, Terms, Truth};
 
 /// A rig as it is: what the host will never see but through its readings.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Compiled {
-    pub(crate) scene: Scene,
+    pub(crate) scene: Arc<Scene>,
     pub(crate) nominal: Nominal,
     pub(crate) simulated: Simulated,
     pub(crate) seed: u64,
     pub(crate) axes: [AxisTruth; 4],
+    pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
     pub(crate) current_per_radiance: f64,
     pub(crate) amplifier: Amplifier,
-    rows: Vec<EffectRow>,
+    chosen: Chosen,
+    region: Region,
+    tolerance: f64,
 }
 
 /// Why a scene and a rig don't make a simulated rig.
@@ -38,6 +44,15 @@ pub enum CompileError {
     /// A length of the detector, or its responsivity, came out of the draw at or below zero: its
     /// uncertainty is as large as itself. Name, value drawn.
     Drawn(&'static str, f64),
+    /// A wish for an effect that can't be granted.
+    Effect {
+        /// The effect.
+        name: String,
+        /// Whether it was to be in.
+        is_forced: bool,
+        /// Why not.
+        why: String,
+    },
     /// A number of the rig that no rig has: name, value.
     Nominal(String, f64),
     /// The scene's levels are in another quantity than the detector is calibrated for.
@@ -47,6 +62,37 @@ pub enum CompileError {
         /// The rig's.
         rig: Quantity,
     },
+    /// A number of the terms that makes no sense: name, value.
+    Terms(&'static str, f64),
+    /// A wish for an effect that is none.
+    UnknownEffect {
+        /// As it was written.
+        name: String,
+        /// What was meant, perhaps.
+        nearest: Option<String>,
+        /// All that there are.
+        known: Vec<String>,
+    },
+}
+
+/// What every candidate is weighed by. Nothing in it is drawn: what a rig is compiled to does not
+/// depend on the seed.
+#[derive(Debug)]
+pub(crate) struct Setting<'s> {
+    pub(crate) scene: &'s Scene,
+    pub(crate) nominal: &'s Nominal,
+    pub(crate) simulated: &'s Simulated,
+    pub(crate) terms: &'s Terms,
+    /// Where readings will be taken.
+    pub(crate) region: Region,
+    /// What can be seen there.
+    pub(crate) field: Arc<dyn Field>,
+    /// Photocurrent per radiance as stated.
+    pub(crate) current_per_radiance: f64,
+    /// The largest radiance of the region.
+    pub(crate) brightest: f64,
+    /// The noise floor: the standard deviation of a dwell's mean in the dark, as a radiance.
+    pub(crate) floor: f64,
 }
 
 /// Compiles a rig. The same arguments give the same rig, to the last bit.
@@ -54,42 +100,119 @@ pub fn compile(
     scene: Scene,
     nominal: Nominal,
     simulated: Simulated,
-    seed: u64,
+    terms: &Terms,
 ) -> Result<Compiled, CompileError> {
     if scene.quantity() != nominal.quantity {
         let (scene, rig) = (scene.quantity(), nominal.quantity);
         return Err(CompileError::Quantity { scene, rig });
     }
-    check(&nominal)?;
-    let current_per_radiance = draw_optics(&nominal.detector, seed)?;
-    let amplifier = draw_amplifier(&nominal.detector, seed)?;
-    let axes = core::array::from_fn(|i| {
-        let (start, margin) = (simulated.start[i], simulated.limit_margin);
-        AxisTruth::draw(AXIS_NAMES[i], &nominal.axes[i], start, margin, seed)
-    });
-    let mut compiled = Compiled {
+    check(&nominal, terms)?;
+    let scene = Arc::new(scene);
+    let setting = Setting::new(&scene, &nominal, &simulated, terms)?;
+    let tolerance = terms.tolerance.unwrap_or_else(|| setting.relative_noise() * PART_OF_NOISE);
+    let mut candidates = optics::candidates(&setting);
+    candidates.extend(mechanics::candidates(&setting));
+    candidates.extend(detector::candidates(&setting));
+    let chosen = decide(candidates, tolerance, terms)?;
+    let departing = detector::departing(&nominal.detector, &chosen);
+    let (region, optics) = (setting.region, optics::chosen(&setting, &chosen));
+    Ok(Compiled {
+        current_per_radiance: draw_optics(&departing, terms.seed)?,
+        amplifier: draw_amplifier(&departing, terms.seed)?,
+        axes: mechanics::axes(&nominal, &simulated, terms.seed, &chosen),
         scene,
         nominal,
         simulated,
-        seed,
-        axes,
-        current_per_radiance,
-        amplifier,
-        rows: Vec::new(),
-    };
-    compiled.rows = rows::write(&compiled);
-    Ok(compiled)
+        seed: terms.seed,
+        optics,
+        chosen,
+        region,
+        tolerance,
+    })
+}
+
+/// What is left out must not show beside the noise of one dwell.
+const PART_OF_NOISE: f64 = 0.1;
+
+impl<'s> Setting<'s> {
+    fn new(
+        scene: &'s Arc<Scene>,
+        nominal: &'s Nominal,
+        simulated: &'s Simulated,
+        terms: &'s Terms,
+    ) -> Result<Self, CompileError> {
+        let detector = &nominal.detector;
+        let throughput =
+            coaxial_disks(detector.pupil_radius_m, detector.spot_radius_m, detector.distance_m)
+                .map_err(|_| CompileError::Drawn("throughput", detector.distance_m))?;
+        let region = terms.region.unwrap_or_else(|| scene.bounding_region());
+        let field: Arc<dyn Field> = Arc::clone(scene) as _;
+        let mut setting = Self {
+            scene,
+            nominal,
+            simulated,
+            terms,
+            region,
+            current_per_radiance: detector.responsivity_a_per_w * throughput.m2_sr(),
+            brightest: field.brightest(&region),
+            field,
+            floor: 0.0,
+        };
+        setting.floor = setting.noise_a(0.0) / setting.current_per_radiance;
+        Ok(setting)
+    }
+
+    /// The largest photocurrent of the region, amperes.
+    pub(crate) fn brightest_a(&self) -> f64 {
+        self.brightest * self.current_per_radiance
+    }
+
+    /// Predicted standard deviation of a dwell's mean at a photocurrent, amperes: shot noise, read
+    /// noise and the converter's steps.
+    fn noise_a(&self, current_a: f64) -> f64 {
+        let detector = &self.nominal.detector;
+        let rate_hz = f64::from(detector.adc_rate_hz);
+        let count_a = self.full_scale_a() / libm::scalbn(1.0, i32::from(detector.adc_bits) - 1);
+        let variance = ELEMENTARY_CHARGE_C * current_a * rate_hz
+            + detector.read_noise_a * detector.read_noise_a
+            + count_a * count_a / 12.0;
+        libm::sqrt(variance / (self.terms.dwell_s * rate_hz).max(1.0))
+    }
+
+    /// Of the range that a person would choose: the finest that the brightest ray does not fill.
+    fn full_scale_a(&self) -> f64 {
+        let ranges = self.nominal.detector.gains.iter().map(|gain| gain.full_scale_a);
+        let coarsest = ranges.clone().fold(0.0, f64::max);
+        let brightest_a = self.brightest_a();
+        ranges.filter(|full_scale_a| *full_scale_a > brightest_a).fold(coarsest, f64::min)
+    }
+
+    /// Predicted relative noise of one dwell on the region's brightest ray.
+    fn relative_noise(&self) -> f64 {
+        let brightest_a = self.brightest_a();
+        self.noise_a(brightest_a) / brightest_a.max(self.noise_a(0.0))
+    }
 }
 
 impl Compiled {
     /// One row an effect, in or out.
     pub fn effects(&self) -> &[EffectRow] {
-        &self.rows
+        &self.chosen.rows
     }
 
     /// What emits.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Where the effects were weighed.
+    pub const fn region(&self) -> &Region {
+        &self.region
+    }
+
+    /// How much all that was left out may change a reading, relative to it.
+    pub const fn tolerance(&self) -> f64 {
+        self.tolerance
     }
 
     /// What leaves the sample, over a region.
@@ -104,61 +227,10 @@ impl Compiled {
 
     /// The stages that a photocurrent goes through on its way to the converter.
     pub(crate) fn stages(&self) -> Stages {
-        Stages::called_for(&self.nominal.detector, self.simulated.dark_current_a, self.seed)
+        let detector = detector::departing(&self.nominal.detector, &self.chosen);
+        let dark_a = detector::dark_current_a(&self.simulated, &self.chosen);
+        Stages::chosen(&detector, dark_a, self.seed, &self.chosen)
     }
-
-    /// The largest photocurrent of any pose with θ up to 89°, amperes.
-    pub(crate) fn brightest_a(&self) -> f64 {
-        let emitters = self.scene.emitters().iter();
-        let peaks = emitters.filter_map(|emitter| emitter.peak_within(GRAZING_RAD));
-        let radiance = peaks.map(|(value, _, _)| value).fold(0.0, f64::max);
-        radiance * self.current_per_radiance
-    }
-}
-
-/// Bounds are taken up to here: beyond, a table's quotient with cos θ says nothing of a patch.
-const GRAZING_RAD: f64 = 89.0 / 180.0 * PI;
-
-fn check(nominal: &Nominal) -> Result<(), CompileError> {
-    let channels: [u8; 4] = core::array::from_fn(|i| nominal.axes[i].channel);
-    let mut sorted = channels;
-    sorted.sort_unstable();
-    if sorted != [0, 1, 2, 3] || nominal.axes.len() > AXES_MAX {
-        return Err(CompileError::Channels(channels));
-    }
-    let positive = |name: String, value: f64| {
-        let sound = value.is_finite() && value > 0.0;
-        if sound { Ok(()) } else { Err(CompileError::Nominal(name, value)) }
-    };
-    let not_negative = |name: String, value: f64| {
-        let sound = value.is_finite() && value >= 0.0;
-        if sound { Ok(()) } else { Err(CompileError::Nominal(name, value)) }
-    };
-    for (name, axis) in AXIS_NAMES.iter().zip(&nominal.axes) {
-        positive(format!("{name}: counts a unit"), axis.counts_per_unit.abs())?;
-        positive(format!("{name}: speed"), f64::from(axis.speed_counts_per_s))?;
-        positive(format!("{name}: acceleration"), f64::from(axis.acceleration_counts_per_s2))?;
-        let travel = f64::from(axis.travel_counts.1) - f64::from(axis.travel_counts.0);
-        positive(format!("{name}: travel"), travel)?;
-        for (what, value) in [
-            ("settle", axis.settle_s),
-            ("u_zero", axis.u_zero),
-            ("u_homing", axis.u_homing),
-            ("u_readback", axis.u_readback),
-        ] {
-            not_negative(format!("{name}: {what}"), value)?;
-        }
-    }
-    let detector = &nominal.detector;
-    not_negative("read noise".into(), detector.read_noise_a)?;
-    positive("adc rate".into(), f64::from(detector.adc_rate_hz))?;
-    let bits = f64::from(detector.adc_bits);
-    positive("adc bits".into(), if (2.0..=32.0).contains(&bits) { bits } else { -bits })?;
-    positive("gain ranges".into(), detector.gains.len() as f64)?;
-    for gain in &detector.gains {
-        positive(format!("full scale of {}", gain.name), gain.full_scale_a)?;
-    }
-    Ok(())
 }
 
 /// A number with its standard uncertainty, drawn; still positive, or refused.
@@ -208,6 +280,10 @@ impl fmt::Display for CompileError {
                 f,
                 "{name}: drawn as {value}, expected above 0: its stated uncertainty is too large"
             ),
+            Self::Effect { name, is_forced, why } => {
+                let wish = if *is_forced { "forced in" } else { "left out" };
+                write!(f, "effect {name} can't be {wish}: {why}")
+            }
             Self::Nominal(name, value) => write!(f, "{name}: {value} is not what a rig has"),
             Self::Quantity { scene, rig } => write!(
                 f,
@@ -215,6 +291,14 @@ impl fmt::Display for CompileError {
                 scene.name(),
                 rig.name()
             ),
+            Self::Terms(name, value) => write!(f, "{name}: {value} is not what a plan has"),
+            Self::UnknownEffect { name, nearest, known } => {
+                write!(f, "no effect is called {name}")?;
+                if let Some(nearest) = nearest {
+                    write!(f, "; did you mean {nearest}?")?;
+                }
+                write!(f, " The effects here: {}", known.join(", "))
+            }
         }
     }
 }

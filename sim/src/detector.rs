@@ -1,10 +1,15 @@
 //! From a photocurrent to counts: just the stages that the rig calls for, one after the other.
 //! A stage that is not called for is not in the list, so that nothing asks for it at run time.
 
+mod effects;
+
 use core::fmt;
+
+pub(crate) use effects::{candidates, dark_current_a, departing};
 
 use crate::NominalDetector;
 use crate::chance::Stream;
+use crate::effect::Chosen;
 
 /// The elementary charge, coulombs; exact since 2019 (SI).
 pub(crate) const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
@@ -26,16 +31,24 @@ pub(crate) trait Stage: fmt::Debug + Send {
 pub(crate) struct Stages(Vec<Box<dyn Stage>>);
 
 impl Stages {
-    pub(crate) fn called_for(detector: &NominalDetector, dark_a: f64, seed: u64) -> Self {
+    /// Those that were chosen; `detector` is without the departures that were not.
+    pub(crate) fn chosen(
+        detector: &NominalDetector,
+        dark_a: f64,
+        seed: u64,
+        chosen: &Chosen,
+    ) -> Self {
         let mut stages: Vec<Box<dyn Stage>> = Vec::new();
         if dark_a != 0.0 {
             stages.push(Box::new(DarkCurrent { dark_a }));
         }
         let rate_hz = f64::from(detector.adc_rate_hz);
-        stages.push(Box::new(ShotNoise {
-            charge_times_rate: ELEMENTARY_CHARGE_C * rate_hz,
-            noise: Noise::new(seed, SHOT_NOISE),
-        }));
+        if chosen.has("shot-noise") {
+            stages.push(Box::new(ShotNoise {
+                charge_times_rate: ELEMENTARY_CHARGE_C * rate_hz,
+                noise: Noise::new(seed, SHOT_NOISE),
+            }));
+        }
         if detector.read_noise_a > 0.0 {
             let sigma_a = detector.read_noise_a;
             stages.push(Box::new(ReadNoise { sigma_a, noise: Noise::new(seed, READ_NOISE) }));
@@ -139,10 +152,5 @@ impl Amplifier {
     pub(crate) fn convert(&self, gain: u8, current_a: f64) -> Option<i32> {
         let counts = current_a * self.counts_per_a.get(usize::from(gain))?;
         Some(libm::round(counts).clamp(self.low, self.high) as i32)
-    }
-
-    /// The currents of one count, one a range, amperes.
-    pub(crate) fn counts_a(&self) -> impl Iterator<Item = f64> {
-        self.counts_per_a.iter().map(|counts_per_a| 1.0 / counts_per_a)
     }
 }

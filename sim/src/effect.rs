@@ -1,7 +1,12 @@
-//! The physical effects as a person sees them: one row each, in or out, why, how large at most,
-//! and how it is computed.
+//! The physical effects as the compiler weighs them and as a person sees them: what calls for
+//! each, how large its influence is at most, whether it is in, and how it is computed.
+//!
+//! It does not know any effect: each module brings its own candidates.
 
 use core::fmt;
+use std::collections::BTreeSet;
+
+use crate::{CompileError, Terms};
 
 /// One effect, in or out.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,12 +15,14 @@ pub struct EffectRow {
     pub name: String,
     /// Whether it is a stage of the compiled rig. What is not has no code that runs.
     pub included: bool,
-    /// The key of scene, rig or `[simulated]` table that calls for it, or would; or a fact found
-    /// while compiling.
-    pub cause: String,
+    /// The key of scene, rig or `[simulated]` table that calls for it, or a fact found while
+    /// compiling. `None`: nothing does.
+    pub cause: Option<String>,
     /// How large its influence is at most; for something random or drawn, its standard
-    /// deviation. `None` where nothing bounds it yet, and `how` says so.
+    /// deviation.
     pub bound: Option<Bound>,
+    /// What it costs a reading, nanoseconds, once somebody has measured it.
+    pub cost_ns: Option<f64>,
     /// How it is computed, or why it is left out.
     pub how: String,
 }
@@ -57,5 +64,235 @@ impl BoundUnit {
 impl fmt::Display for Bound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.3e} {}", self.value, self.unit.symbol())
+    }
+}
+
+/// An effect before it is decided whether it is in.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    /// Stable, in lower case with hyphens; with its place in the file where there are several.
+    pub(crate) name: String,
+    /// What calls for it. `None`: nothing.
+    pub(crate) cause: Option<String>,
+    pub(crate) influence: Influence,
+    /// How it is computed where it is in.
+    pub(crate) how_in: String,
+    /// What a reading is taken for where it is out; why nothing calls for it.
+    pub(crate) how_out: String,
+}
+
+/// How much an effect matters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Influence {
+    /// It is part of what a reading is (the signal itself, the converter's counts): it can't be
+    /// left out, by nobody. With what there is to say of its size.
+    Mandatory(Option<Bound>),
+    /// At most |with - without| / max(|reading|, noise floor) over the region, the larger of the
+    /// two readings. Of something random, the standard deviation of a dwell's mean.
+    Relative(f64),
+    /// A size in a unit of its own, which no tolerance compares with: in where it is called for.
+    Sized(Bound),
+}
+
+impl Candidate {
+    /// Called for, or not, by a number of a file: `key` says which, with its value.
+    pub(crate) fn of_key(
+        name: impl Into<String>,
+        key: &str,
+        calls: bool,
+        influence: Influence,
+        how_in: &str,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            cause: calls.then(|| key.to_owned()),
+            influence,
+            how_in: how_in.to_owned(),
+            how_out: format!("not called for: {key}"),
+        }
+    }
+
+    fn bound(&self) -> Option<Bound> {
+        match self.influence {
+            Influence::Mandatory(bound) => bound,
+            Influence::Relative(value) => Some(Bound { value, unit: BoundUnit::Relative }),
+            Influence::Sized(bound) => Some(bound),
+        }
+    }
+}
+
+/// What was decided: which effects are in, and the row of each.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Chosen {
+    included: BTreeSet<String>,
+    pub(crate) rows: Vec<EffectRow>,
+}
+
+impl Chosen {
+    /// Whether an effect is in.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.included.contains(name)
+    }
+}
+
+/// Why an effect is in or out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    CalledFor,
+    Forced,
+    NotCalledFor,
+    BelowTolerance,
+    Without,
+}
+
+/// Decides: out is what nothing calls for, what a person wants out, and of what can be weighed
+/// the smallest, as long as the sum of what is left out stays within the tolerance.
+pub(crate) fn decide(
+    candidates: Vec<Candidate>,
+    tolerance: f64,
+    terms: &Terms,
+) -> Result<Chosen, CompileError> {
+    check(&candidates, terms)?;
+    let mut why: Vec<Why> = candidates
+        .iter()
+        .map(|candidate| {
+            if terms.without.contains(&candidate.name) {
+                Why::Without
+            } else if candidate.cause.is_none() {
+                Why::NotCalledFor
+            } else if terms.force.contains(&candidate.name) {
+                Why::Forced
+            } else {
+                Why::CalledFor
+            }
+        })
+        .collect();
+    let mut weighed: Vec<(f64, usize)> = candidates
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| why[*i] == Why::CalledFor)
+        .filter_map(|(i, candidate)| match candidate.influence {
+            Influence::Relative(bound) => Some((bound, i)),
+            Influence::Mandatory(_) | Influence::Sized(_) => None,
+        })
+        .collect();
+    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut left_out = 0.0;
+    for (bound, i) in weighed {
+        left_out += bound;
+        if left_out > tolerance {
+            break;
+        }
+        why[i] = Why::BelowTolerance;
+    }
+    let mut chosen = Chosen::default();
+    for (candidate, why) in candidates.into_iter().zip(why) {
+        if matches!(why, Why::CalledFor | Why::Forced) {
+            chosen.included.insert(candidate.name.clone());
+        }
+        chosen.rows.push(row(candidate, why, tolerance));
+    }
+    Ok(chosen)
+}
+
+fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
+    let bound = candidate.bound();
+    let Candidate { name, cause, how_in, how_out, .. } = candidate;
+    let how = match why {
+        Why::CalledFor => how_in,
+        Why::Forced => format!("{how_in} (forced)"),
+        Why::NotCalledFor => how_out,
+        Why::BelowTolerance => {
+            format!(
+                "left out: what is left out stays within the tolerance of {tolerance:.1e}; {how_out}"
+            )
+        }
+        Why::Without => format!("left out by request; {how_out}"),
+    };
+    let included = matches!(why, Why::CalledFor | Why::Forced);
+    EffectRow { name, included, cause, bound, cost_ns: None, how }
+}
+
+/// Names that are none, and wishes that can't be granted.
+fn check(candidates: &[Candidate], terms: &Terms) -> Result<(), CompileError> {
+    for (name, is_forced) in
+        terms.force.iter().map(|name| (name, true)).chain(terms.without.iter().map(|n| (n, false)))
+    {
+        let Some(candidate) = candidates.iter().find(|candidate| candidate.name == *name) else {
+            let known: Vec<String> = candidates.iter().map(|c| c.name.clone()).collect();
+            let nearest = spanned_toml::nearest(name, &known).cloned();
+            return Err(CompileError::UnknownEffect { name: name.clone(), nearest, known });
+        };
+        let refused = if is_forced {
+            candidate.cause.is_none().then(|| candidate.how_out.clone())
+        } else if matches!(candidate.influence, Influence::Mandatory(_)) {
+            Some("it is part of what a reading is".to_owned())
+        } else {
+            terms.force.contains(name).then(|| "it is forced as well".to_owned())
+        };
+        if let Some(why) = refused {
+            return Err(CompileError::Effect { name: name.clone(), is_forced, why });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(name: &str, is_called: bool, influence: Influence) -> Candidate {
+        Candidate::of_key(name, "some.key = 1", is_called, influence, "in some way")
+    }
+
+    fn candidates() -> Vec<Candidate> {
+        vec![
+            candidate("signal", true, Influence::Mandatory(None)),
+            candidate("large", true, Influence::Relative(0.5)),
+            candidate("small", true, Influence::Relative(4e-4)),
+            candidate("smaller", true, Influence::Relative(3e-4)),
+            candidate("absent", false, Influence::Relative(0.0)),
+        ]
+    }
+
+    fn included(
+        tolerance: f64,
+        force: &[&str],
+        without: &[&str],
+    ) -> Result<Vec<String>, CompileError> {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let terms = Terms { force: owned(force), without: owned(without), ..Terms::default() };
+        let chosen = decide(candidates(), tolerance, &terms)?;
+        let rows = chosen.rows.iter().filter(|row| row.included).map(|row| row.name.clone());
+        let rows: Vec<String> = rows.collect();
+        assert!(rows.iter().all(|name| chosen.has(name)));
+        assert_eq!(chosen.rows.len(), 5, "a row for each, in or out");
+        Ok(rows)
+    }
+
+    #[test]
+    fn the_smallest_are_left_out_as_long_as_their_sum_is_tolerable() {
+        assert_eq!(included(0.0, &[], &[]).unwrap(), ["signal", "large", "small", "smaller"]);
+        assert_eq!(included(5e-4, &[], &[]).unwrap(), ["signal", "large", "small"]);
+        // Either alone would do, but not both.
+        assert_eq!(included(6.9e-4, &[], &[]).unwrap(), ["signal", "large", "small"]);
+        assert_eq!(included(7.1e-4, &[], &[]).unwrap(), ["signal", "large"]);
+        assert_eq!(included(1.0, &[], &[]).unwrap(), ["signal"]);
+    }
+
+    #[test]
+    fn a_person_has_the_last_word_on_what_is_not_the_signal() {
+        assert_eq!(included(1.0, &["small"], &[]).unwrap(), ["signal", "small"]);
+        assert_eq!(included(0.0, &[], &["large"]).unwrap(), ["signal", "small", "smaller"]);
+        // What is out by request is no part of what the tolerance allows.
+        assert_eq!(included(5e-4, &[], &["smaller"]).unwrap(), ["signal", "large"]);
+        let refused = |force: &[&str], without: &[&str]| {
+            included(0.0, force, without).unwrap_err().to_string()
+        };
+        assert!(refused(&["smal"], &[]).contains("did you mean small?"));
+        assert!(refused(&[], &["nonsense"]).contains("signal, large, small, smaller, absent"));
+        assert!(refused(&["absent"], &[]).contains("not called for: some.key = 1"));
+        assert!(refused(&[], &["signal"]).contains("part of what a reading is"));
+        assert!(refused(&["large"], &["large"]).contains("forced as well"));
     }
 }

@@ -2,7 +2,7 @@
 //! firmware core and the same wire as a real rig.
 //!
 //! [`Scene`] says what emits, [`Nominal`] what the rig file states, [`Simulated`] what a real rig
-//! would keep to itself. [`compile()`] turns them and a seed into a [`Compiled`] rig: its rows of
+//! would keep to itself. On given [`Terms`], [`compile()`] turns them into a [`Compiled`] rig: its rows of
 //! effects, its truth, and the [`SimulatedBoard`] that the device core drives. [`serve()`] puts a
 //! device on a byte stream paced like a [`Wire`], and [`Pty`] is such a stream for other programs.
 //!
@@ -11,15 +11,17 @@
 
 mod board;
 mod chance;
+mod check;
 mod compile;
 mod detector;
 mod effect;
 #[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod levels;
+mod field;
 mod mechanics;
 mod nominal;
+mod optics;
 mod pty;
-mod rows;
 mod scene;
 mod serve;
 mod simulated;
@@ -28,14 +30,17 @@ mod stage;
 mod switches;
 #[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod time;
+mod terms;
 mod truth;
 mod wire;
 
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
 pub use effect::{Bound, BoundUnit, EffectRow};
+pub use field::Ray;
 pub use mechanics::SeenRay;
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
+pub use optics::Axis;
 pub use pty::Pty;
 pub use scene::{
     EXPONENT_MAX, Emitter, Law, Load, Scene, SceneError, Shape, Tabulated, TabulatedError,
@@ -43,5 +48,6 @@ pub use scene::{
 pub use serve::serve;
 pub use simulated::{LinkFaults, Simulated};
 pub use time::{MainsFlicker, SourceOverTime, WarmUp};
+pub use terms::Terms;
 pub use truth::{Peak, Region, Truth};
 pub use wire::Wire;

@@ -5,13 +5,18 @@
 //! swings in the laboratory's x-z plane and holds the detector over the point where the axes
 //! meet. Below it stands the turntable, on that the stage, on that the sample.
 
+mod effects;
+
 use core::time::Duration;
 
 use firmware_protocol::Instant;
 use glam::{DMat3, DVec3};
 
+pub(crate) use effects::{axes, candidates};
+
 use crate::NominalAxis;
 use crate::chance::{draw, mix};
+use crate::optics;
 use crate::switches::Switches;
 
 /// A ray from the sample to the detector: where it leaves, metres, and its direction, radians.
@@ -27,22 +32,28 @@ pub struct SeenRay {
     pub phi_rad: f64,
 }
 
-/// The ray seen when the joints θ, φ, x, y stand at these values (radians, metres).
+/// Where the detector is when the joints θ, φ, x, y stand at these values (radians, metres).
 ///
 /// With the arm at θ the detector is at Ry(θ) ẑ from the point where it looks. The turntable at φ
 /// has turned the sample by -φ about z, so that in the sample's frame the detector stands at
 /// Rz(φ) Ry(θ) ẑ. The stage at (x, y) has carried the sample's point (x, y) to the axis.
-pub(crate) fn forward([theta, phi, x, y]: [f64; 4]) -> SeenRay {
+pub(crate) fn forward([theta, phi, x, y]: [f64; 4]) -> optics::Axis {
     let turntable = DMat3::from_rotation_z(-phi);
     let to_detector = DMat3::from_rotation_y(theta) * DVec3::Z;
-    let in_sample = turntable.transpose() * to_detector;
     let stage = DVec3::new(-x, -y, 0.0);
-    let seen = -stage;
-    SeenRay {
-        x_m: seen.x,
-        y_m: seen.y,
-        theta_rad: libm::atan2(libm::hypot(in_sample.x, in_sample.y), in_sample.z),
-        phi_rad: libm::atan2(in_sample.y, in_sample.x),
+    optics::Axis { spot: -stage, direction: turntable.transpose() * to_detector }
+}
+
+impl From<optics::Axis> for SeenRay {
+    /// The axis as a ray.
+    fn from(axis: optics::Axis) -> Self {
+        let (spot, direction) = (axis.spot, axis.direction);
+        Self {
+            x_m: spot.x,
+            y_m: spot.y,
+            theta_rad: libm::atan2(libm::hypot(direction.x, direction.y), direction.z),
+            phi_rad: libm::atan2(direction.y, direction.x),
+        }
     }
 }
 
@@ -127,9 +138,9 @@ impl AxisTruth {
     }
 
     /// How far the axis may be off when it stops, in units.
-    pub(crate) fn lag_units_max(&self) -> f64 {
-        let lag = self.settle.as_ref().map_or(0.0, |settle| settle.lag_counts_max);
-        lag / self.counts_per_unit.abs()
+    pub(crate) fn lag_units_max(axis: &NominalAxis) -> f64 {
+        let lag_s = axis.settle_s * LAG_PART_OF_SETTLE;
+        f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s / axis.counts_per_unit.abs()
     }
 
     /// The mark as it is found at the n-th homing of this boot, counts. By its number and not by
@@ -279,7 +290,8 @@ mod tests {
 
     #[test]
     fn the_arm_leans_along_x_and_the_turntable_turns_the_azimuth() {
-        let close = |ray: SeenRay, theta: f64, phi: f64| {
+        let close = |axis: optics::Axis, theta: f64, phi: f64| {
+            let ray = SeenRay::from(axis);
             let near = |a: f64, b: f64| libm::fabs(a - b) < 1e-14;
             assert!(near(ray.theta_rad, theta) && near(ray.phi_rad, phi), "{ray:?}");
         };
@@ -290,7 +302,7 @@ mod tests {
         let (arm, turntable) = ((-30.0_f64).to_radians(), 20.0_f64.to_radians());
         close(forward([arm, turntable, 0.0, 0.0]), 30.0_f64.to_radians(), turntable - PI);
         close(forward([FRAC_PI_2, 0.2, 0.0, 0.0]), FRAC_PI_2, 0.2);
-        let ray = forward([0.3, 0.9, 0.01, -0.02]);
+        let ray = SeenRay::from(forward([0.3, 0.9, 0.01, -0.02]));
         assert_eq!((ray.x_m, ray.y_m), (0.01, -0.02));
     }
 

@@ -10,7 +10,7 @@ use bench::{COUNTS_PER_M, counts, exact_rig};
 use firmware_protocol::{
     AxisMask, Cause, CommandId, DeviceCore, Event, Home, Instant, MoveTo, Reply, Request,
 };
-use sim::{Nominal, Quantity, Scene, Simulated, SimulatedBoard, compile};
+use sim::{Nominal, Quantity, Scene, Simulated, SimulatedBoard, Terms, compile};
 
 const X_CHANNEL: u8 = 3;
 /// Half the travel of x in the bench's rig, and a margin of 1 % of the whole.
@@ -28,7 +28,8 @@ struct Run {
 impl Run {
     fn new(nominal: Nominal, simulated: Simulated, seed: u64) -> Self {
         let scene = Scene::new(Quantity::Radiance);
-        let compiled = compile(scene, nominal, simulated, seed).expect("a sound rig");
+        let compiled =
+            compile(scene, nominal, simulated, &Terms::seeded(seed)).expect("a sound rig");
         let board = SimulatedBoard::new(Arc::new(compiled), 0);
         let mut run =
             Self { core: DeviceCore::new(board), now: Instant::ZERO, ids: 0, x_m: (0.0, 0.0) };

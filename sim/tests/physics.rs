@@ -10,7 +10,7 @@ use bench::{compiled, counts, exact_rig};
 use firmware_protocol::{Board, Illumination, Instant, Shutter};
 use sim::{
     Compiled, Emitter, Nominal, Quantity, Region, Scene, Shape, Simulated, SimulatedBoard,
-    Tabulated, compile,
+    Tabulated, Terms, compile,
 };
 
 const FULL_SCALE: f64 = 8_388_608.0;
@@ -133,7 +133,7 @@ fn switching_one_effect_leaves_the_noise_of_others_alone() {
     let with = |change: &dyn Fn(&mut Nominal, &mut Simulated)| {
         let (mut rig, mut simulated) = (exact_rig(), Simulated::default());
         change(&mut rig, &mut simulated);
-        let compiled = compile(lambertian(40.0), rig, simulated, 4).unwrap();
+        let compiled = compile(lambertian(40.0), rig, simulated, &Terms::seeded(4)).unwrap();
         dwell(&mut homed(&Arc::new(compiled)), 9, Shutter::Open, 500)
     };
     let differences =
@@ -325,20 +325,19 @@ fn a_rig_holds_what_is_called_for_and_says_why() {
     let row = |rig: &Compiled, name: &str| {
         rig.effects().iter().find(|row| row.name == name).cloned().expect("a row for each effect")
     };
-    for name in ["dark current", "read noise", "theta zero", "distance", "gain 1 uA", "finite beam"]
-    {
+    for name in ["dark-current", "read-noise", "theta-zero", "distance", "gain[0]", "finite-beam"] {
         assert!(!row(&bare, name).included, "{name}");
     }
-    assert!(row(&bare, "finite beam").how.contains("point-sampled"));
+    assert!(row(&bare, "finite-beam").how.contains("point-sampled"));
     let mut rig = exact_rig();
     rig.detector.read_noise_a = 2e-13;
     rig.detector.gains[0].u_relative = 5e-4;
     rig.axes[0].u_zero = 3e-4;
     let full = compiled(lambertian(1.0), rig, 1);
     let bound = |name: &str| row(&full, name).bound.expect("a bound").value;
-    assert!(["read noise", "theta zero", "gain 1 uA"].iter().all(|name| row(&full, name).included));
+    assert!(["read-noise", "theta-zero", "gain[0]"].iter().all(|name| row(&full, name).included));
     assert_eq!(
-        [bound("read noise"), bound("gain 1 uA"), bound("theta zero")].map(f64::to_bits),
+        [bound("read-noise"), bound("gain[0]"), bound("theta-zero")].map(f64::to_bits),
         [2e-13, 5e-4, 3e-4].map(f64::to_bits)
     );
     let names: std::collections::BTreeSet<_> = full.effects().iter().map(|row| &row.name).collect();
@@ -350,8 +349,9 @@ fn rigs_that_cannot_be_are_refused() {
     let refused = |change: &dyn Fn(&mut Nominal)| {
         let mut rig = exact_rig();
         change(&mut rig);
-        let mut outcomes =
-            (0..40).map(|seed| compile(lambertian(1.0), rig.clone(), Simulated::default(), seed));
+        let mut outcomes = (0..40).map(|seed| {
+            compile(lambertian(1.0), rig.clone(), Simulated::default(), &Terms::seeded(seed))
+        });
         outcomes.find_map(Result::err).expect("refused").to_string()
     };
     assert!(refused(&|rig| rig.quantity = Quantity::Luminance).contains("radiance"));

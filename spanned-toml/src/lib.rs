@@ -15,4 +15,4 @@ mod value;
 pub use bounds::Bounds;
 pub use problem::Problem;
 pub use source::{Document, Source};
-pub use table::Table;
+pub use table::{Table, nearest};

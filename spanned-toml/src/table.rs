@@ -316,7 +316,14 @@ fn shortened(text: &str) -> String {
     text.chars().take(SHOWN_MAX).collect()
 }
 
-fn nearest<'a>(word: &str, known: &'a [String]) -> Option<&'a String> {
+/// The known word that a person most likely meant, if any is near.
+///
+/// ```
+/// let known = ["shot-noise".to_owned(), "read-noise".to_owned()];
+/// assert_eq!(spanned_toml::nearest("shot-nosie", &known), Some(&known[0]));
+/// assert_eq!(spanned_toml::nearest("beam", &known), None);
+/// ```
+pub fn nearest<'a>(word: &str, known: &'a [String]) -> Option<&'a String> {
     if word.len() > SHOWN_MAX {
         return None;
     }

@@ -83,7 +83,8 @@ fn effects_text(effects: &[sim::EffectRow]) -> String {
     let mut text = String::new();
     for (line, row) in table(&rows).lines().zip(effects) {
         let _ = writeln!(text, "{line}");
-        text.push_str(&wrapped(&format!("because {}", row.cause), 7));
+        let cause = row.cause.as_deref().unwrap_or("nothing calls for it");
+        text.push_str(&wrapped(&format!("because {}", cause), 7));
         text.push_str(&wrapped(&row.how, 7));
     }
     text

@@ -22,7 +22,8 @@ pub(crate) fn default_folder(name: &str) -> PathBuf {
 pub(crate) fn header(setup: &Setup) -> Header {
     let effects = setup.stage.as_ref().map_or_else(Vec::new, |stage| {
         let rows = stage.compiled.effects().iter().filter(|row| row.included);
-        rows.map(|row| format!("{}: {}", row.name, row.cause)).collect()
+        rows.map(|row| format!("{}: {}", row.name, row.cause.as_deref().unwrap_or("nothing")))
+            .collect()
     });
     Header {
         program_version: env!("CARGO_PKG_VERSION").to_owned(),

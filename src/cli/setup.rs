@@ -245,7 +245,7 @@ fn compile(scene: sim::Scene, rig: &Rig, seed: u64) -> Result<Stage, Failure> {
     let simulated = root.table("simulated")?.map(sim::Simulated::read).transpose()?;
     let simulated = simulated.unwrap_or_default();
     let faults = simulated.faults;
-    let compiled = sim::compile(scene, nominal(rig), simulated, seed)
+    let compiled = sim::compile(scene, nominal(rig), simulated, &sim::Terms::seeded(seed))
         .map_err(|error| Failure::start(format!("{}: {error}", rig.document().source().name())))?;
     Ok(Stage { compiled: Arc::new(compiled), faults, seed })
 }

@@ -3,6 +3,8 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
+use glam::DVec3;
+
 use super::Tabulated;
 
 /// An angular law, for a level of one.
@@ -37,6 +39,23 @@ impl Law {
             Self::CosinePower { exponent } => libm::pow(libm::cos(theta_rad), *exponent),
             Self::Lambertian => 1.0,
             Self::Tabulated(table) => table.intensity(theta_rad, phi_rad) / libm::cos(theta_rad),
+        }
+    }
+
+    /// As [`Law::radiance`], into a direction of length one.
+    pub(super) fn radiance_into(&self, direction: DVec3) -> f64 {
+        let cos_theta = direction.z;
+        if cos_theta <= 0.0 {
+            return 0.0;
+        }
+        match self {
+            Self::CosinePower { exponent } => libm::pow(cos_theta, *exponent),
+            Self::Lambertian => 1.0,
+            Self::Tabulated(_) => {
+                let sin_theta = libm::hypot(direction.x, direction.y);
+                let theta_rad = libm::atan2(sin_theta, cos_theta);
+                self.radiance(theta_rad, libm::atan2(direction.y, direction.x))
+            }
         }
     }
 

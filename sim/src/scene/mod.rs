@@ -12,12 +12,14 @@ mod tabulated;
 use core::f64::consts::PI;
 use core::fmt;
 
+use glam::DVec3;
+
 pub use file::Load;
 pub use law::Law;
 pub use shape::Shape;
 pub use tabulated::{Tabulated, TabulatedError};
 
-use crate::Quantity;
+use crate::{Quantity, Region};
 
 /// A patch of the sample that emits.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +72,11 @@ impl Emitter {
     /// flat patch is not seen.
     pub fn radiance(&self, theta_rad: f64, phi_rad: f64) -> f64 {
         self.level * self.law.radiance(theta_rad, phi_rad)
+    }
+
+    /// As [`Emitter::radiance`], into a direction of length one.
+    pub fn radiance_into(&self, direction: DVec3) -> f64 {
+        self.level * self.law.radiance_into(direction)
     }
 
     /// Exitance into directions up to `theta_max_rad` from the normal.
@@ -149,6 +156,16 @@ impl Scene {
     /// were handled, and light that the scene leaves out.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// The bounding rectangle of all patches, with directions up to 80°. Of a dark scene, the
+    /// square centimetre around the origin.
+    pub(crate) fn bounding_region(&self) -> Region {
+        let around = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        let boxes = self.emitters.iter().map(|emitter| emitter.shape.bounding_box());
+        let all = boxes.reduce(|a, b| (around(a.0, b.0), around(a.1, b.1)));
+        let (x_m, y_m) = all.unwrap_or(((-0.005, 0.005), (-0.005, 0.005)));
+        Region { x_m, y_m, theta_max_rad: 80.0 / 180.0 * PI }
     }
 
     /// Radiance from (x, y), metres, into (θ, φ), radians. Zero off every patch. On an outline

@@ -56,6 +56,16 @@ impl Shape {
         }
     }
 
+    /// From low to high along x and along y, metres.
+    pub(crate) fn bounding_box(&self) -> ((f64, f64), (f64, f64)) {
+        match *self {
+            Self::Disk { x_m, y_m, radius_m } => {
+                ((x_m - radius_m, x_m + radius_m), (y_m - radius_m, y_m + radius_m))
+            }
+            Self::Rectangle { x_m, y_m } => (x_m, y_m),
+        }
+    }
+
     /// Square metres.
     pub fn area_m2(&self) -> f64 {
         match *self {

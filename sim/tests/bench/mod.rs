@@ -11,7 +11,7 @@ use firmware_protocol::{
 };
 use sim::{
     Compiled, Nominal, NominalAxis, NominalDetector, NominalGain, Quantity, Scene, Simulated,
-    SimulatedBoard, compile,
+    SimulatedBoard, Terms, compile,
 };
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
@@ -63,7 +63,9 @@ pub fn exact_rig() -> Nominal {
 }
 
 pub fn compiled(scene: Scene, nominal: Nominal, seed: u64) -> Arc<Compiled> {
-    Arc::new(compile(scene, nominal, Simulated::default(), seed).expect("a sound rig"))
+    Arc::new(
+        compile(scene, nominal, Simulated::default(), &Terms::seeded(seed)).expect("a sound rig"),
+    )
 }
 
 pub fn device(compiled: &Arc<Compiled>) -> Device<SimulatedBoard> {

@@ -1,0 +1,104 @@
+//! Radiance as a function on rays, in the sample's frame: what stands on the sample, without the
+//! detector that looks at it.
+
+use core::f64::consts::TAU;
+use core::fmt;
+
+use glam::DVec3;
+
+use crate::{Region, Scene};
+
+/// A ray from the sample to the detector, sample's frame. It is named by where it crosses the
+/// sample's plane and by its direction: light that leaves something above the plane goes along the
+/// ray that would have come from the plane. Within one medium its radiance is the same all along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where it crosses z = 0, metres.
+    pub point: DVec3,
+    /// Of length one, from the sample to the detector.
+    pub direction: DVec3,
+}
+
+impl Ray {
+    /// From (x, y) on the sample into (θ, φ).
+    pub fn new(x_m: f64, y_m: f64, theta_rad: f64, phi_rad: f64) -> Self {
+        let (sin, cos) = libm::sincos(theta_rad);
+        let (sin_phi, cos_phi) = libm::sincos(phi_rad);
+        Self {
+            point: DVec3::new(x_m, y_m, 0.0),
+            direction: DVec3::new(sin * cos_phi, sin * sin_phi, cos),
+        }
+    }
+
+    /// The ray through a point anywhere along a direction. `None` for one that never comes from
+    /// the sample's plane: it runs along it, or from above.
+    pub fn through(point: DVec3, direction: DVec3) -> Option<Self> {
+        if direction.z <= EDGE_ON {
+            return None;
+        }
+        let crossing = point - direction * (point.z / direction.z);
+        let point = DVec3::new(crossing.x, crossing.y, 0.0);
+        point.is_finite().then_some(Self { point, direction })
+    }
+}
+
+/// The cosine below which a ray runs along the plane: cos 90° is not zero in floating point.
+const EDGE_ON: f64 = 1e-12;
+
+/// What can be looked at.
+pub(crate) trait Field: fmt::Debug + Send + Sync {
+    /// Radiance along a ray, in the scene's unit; zero off the sample.
+    fn radiance(&self, ray: &Ray) -> f64;
+
+    /// Rays of a region among which there are, but for a stated margin, the brightest one and
+    /// those around which the field changes most: its corners, and the field's own landmarks.
+    fn landmarks(&self, region: &Region) -> Vec<Ray> {
+        grid(region)
+    }
+
+    /// The largest radiance of a region; no less than that of any landmark.
+    fn brightest(&self, region: &Region) -> f64 {
+        self.landmarks(region).iter().map(|ray| self.radiance(ray)).fold(0.0, f64::max)
+    }
+}
+
+/// Places a side, polar angles and azimuths of the landmarks that every region has.
+const PLACES: u32 = 5;
+const POLAR: u32 = 16;
+const AZIMUTHS: u32 = 16;
+
+/// A grid of rays over a region, its corners and its largest θ included.
+pub(crate) fn grid(region: &Region) -> Vec<Ray> {
+    let between =
+        |(low, high): (f64, f64), i: u32| low + (high - low) * f64::from(i) / f64::from(PLACES - 1);
+    let mut rays = Vec::new();
+    for place in 0..PLACES * PLACES {
+        let (x, y) = (between(region.x_m, place / PLACES), between(region.y_m, place % PLACES));
+        rays.push(Ray::new(x, y, 0.0, 0.0));
+        for direction in 0..POLAR * AZIMUTHS {
+            let theta =
+                region.theta_max_rad * f64::from(direction / AZIMUTHS + 1) / f64::from(POLAR);
+            let phi = TAU * f64::from(direction % AZIMUTHS) / f64::from(AZIMUTHS);
+            rays.push(Ray::new(x, y, theta, phi));
+        }
+    }
+    rays
+}
+
+impl Field for Scene {
+    fn radiance(&self, ray: &Ray) -> f64 {
+        self.emitters()
+            .iter()
+            .find(|emitter| emitter.shape().contains(ray.point.x, ray.point.y))
+            .map_or(0.0, |emitter| emitter.radiance_into(ray.direction))
+    }
+
+    fn brightest(&self, region: &Region) -> f64 {
+        let seen = self
+            .emitters()
+            .iter()
+            .filter(|emitter| emitter.shape().point_within(region.x_m, region.y_m).is_some());
+        let peaks = seen.filter_map(|emitter| emitter.peak_within(region.theta_max_rad));
+        peaks.map(|(value, ..)| value).fold(0.0, f64::max)
+    }
+}
