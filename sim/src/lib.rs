@@ -15,9 +15,9 @@ mod check;
 mod compile;
 mod detector;
 mod effect;
+mod field;
 #[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod levels;
-mod field;
 mod mechanics;
 mod nominal;
 mod optics;
@@ -28,9 +28,9 @@ mod simulated;
 #[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod stage;
 mod switches;
+mod terms;
 #[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod time;
-mod terms;
 mod truth;
 mod wire;
 
@@ -47,7 +47,7 @@ pub use scene::{
 };
 pub use serve::serve;
 pub use simulated::{LinkFaults, Simulated};
-pub use time::{MainsFlicker, SourceOverTime, WarmUp};
 pub use terms::Terms;
+pub use time::{MainsFlicker, SourceOverTime, WarmUp};
 pub use truth::{Peak, Region, Truth};
 pub use wire::Wire;
