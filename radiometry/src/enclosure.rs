@@ -1,5 +1,5 @@
-//! An enclosure of diffuse surfaces: its form factors made consistent, and the balance of radiosity. It
-//! does not know how the factors were found.
+//! An enclosure of diffuse surfaces: its form factors made consistent, and the balance of radiosity. How
+//! a single factor is found it does not know.
 //!
 //! For the person at the rig: how much light goes round in a box or between baffles. Reference: Sparrow
 //! and Cess, *Radiation Heat Transfer* (1978), ch. 3; the matrix is completed by the laws that it must
@@ -9,8 +9,11 @@ use core::f64::consts::PI;
 use core::fmt;
 
 use crate::domain::{DomainError, not_negative, positive, within};
+use crate::estimate::{EstimateError, Tolerance};
+use crate::form_factor::between_fronts;
 use crate::quadrature::Sum;
 use crate::quantity::{Area, Exitance, FormFactor, Irradiance, Radiance};
+use crate::shape::Polygon;
 
 /// How far a row's given factors may exceed 1 by their own error before it counts as a mistake.
 const EXCESS_MAX: f64 = 1e-6;
@@ -41,6 +44,15 @@ pub enum EnclosureError {
         /// That of the list of areas.
         surfaces: usize,
     },
+    /// The factor of a pair is not known well enough.
+    Pair {
+        /// The one surface, counted from 0.
+        from: usize,
+        /// The other.
+        to: usize,
+        /// What the integral came to.
+        error: EstimateError,
+    },
     /// The factors from a surface to the others sum to more than 1.
     Overfull {
         /// Counted from 0.
@@ -69,6 +81,9 @@ impl fmt::Display for EnclosureError {
             Self::Domain(error) => error.fmt(f),
             Self::Count { list, count, surfaces } => {
                 write!(f, "{list} has {count} entries, expected {surfaces}, one for each surface")
+            }
+            Self::Pair { from, to, error } => {
+                write!(f, "the form factor from surface {from} to surface {to}: {error}")
             }
             Self::Overfull { surface, sum } => {
                 write!(
@@ -125,16 +140,27 @@ impl Enclosure {
         areas: &[Area],
         mut factor: impl FnMut(usize, usize) -> FormFactor,
     ) -> Result<Self, EnclosureError> {
+        Self::completed(areas, |i, j| Ok((factor(i, j), 0.0)))
+    }
+
+    /// From factors with a bound of the error of each.
+    fn completed(
+        areas: &[Area],
+        mut factor: impl FnMut(usize, usize) -> Result<(FormFactor, f64), EnclosureError>,
+    ) -> Result<Self, EnclosureError> {
         let count = areas.len();
         let mut areas_m2 = Vec::with_capacity(count);
         for area in areas {
             areas_m2.push(positive("area_m2", area.m2())?);
         }
         let mut exchange = vec![vec![0.0; count]; count];
+        let mut bounds = vec![0.0; count];
         for i in 0..count {
-            #[expect(clippy::needless_range_loop, reason = "both entries of a symmetric pair")]
             for j in i + 1..count {
-                let ratio = within("form factor", factor(i, j).ratio(), 0.0, 1.0)?;
+                let (factor, bound) = factor(i, j)?;
+                let ratio = within("form factor", factor.ratio(), 0.0, 1.0)?;
+                bounds[i] += bound;
+                bounds[j] += bound * (areas_m2[i] / areas_m2[j]);
                 exchange[i][j] = areas_m2[i] * ratio;
                 exchange[j][i] = exchange[i][j];
             }
@@ -142,12 +168,46 @@ impl Enclosure {
         for i in 0..count {
             let others: Sum = exchange[i].iter().copied().collect();
             let sum = others.value() / areas_m2[i];
-            if sum > 1.0 + EXCESS_MAX {
+            if sum > 1.0 + EXCESS_MAX + bounds[i] {
                 return Err(EnclosureError::Overfull { surface: i, sum });
             }
             exchange[i][i] = (areas_m2[i] - others.value()).max(0.0);
         }
         Ok(Self { areas_m2, exchange })
+    }
+
+    /// From flat faces, convex or not, that act by their fronts: their vertices run counter-clockwise as
+    /// seen from the cavity. Every face hides what is behind it from every pair, where it stands between
+    /// them: a box in a room, a corner that a room goes around. A face must not be split by another (the
+    /// floor under a box is no part of the enclosure). The factor of each pair is known to the tolerance,
+    /// relative to what it would be without the others; the rest to 1 of a row is the face's own, and
+    /// tells by how much the faces fail to close.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use radiometry::{Tolerance, enclosure::Enclosure, shape::Polygon};
+    /// // A tetrahedron: by symmetry, from the base to each of the others a third.
+    /// let [a, b, c, d] = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]]
+    ///     .map(DVec3::from_array);
+    /// let faces = [[a, b, c], [a, d, b], [a, c, d], [b, d, c]];
+    /// let mut polygons = Vec::new();
+    /// for face in faces {
+    ///     polygons.push(Polygon::new(face.to_vec())?);
+    /// }
+    /// let enclosure = Enclosure::from_polygons(&polygons, Tolerance::from_relative(1e-8)?)?;
+    /// assert!((enclosure.form_factor(0, 3).unwrap().ratio() - 1.0 / 3.0).abs() < 1e-8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_polygons(faces: &[Polygon], tolerance: Tolerance) -> Result<Self, EnclosureError> {
+        let areas: Vec<Area> = faces.iter().map(|face| Area::from_m2(area_m2(face))).collect();
+        Self::completed(&areas, |i, j| {
+            let apart = faces.iter().enumerate().filter(|(k, _)| *k != i && *k != j);
+            let others = apart.map(|(_, face)| face);
+            match between_fronts(&faces[i], &faces[j], others, tolerance) {
+                Ok(factor) => Ok((FormFactor::from_ratio(factor.value), factor.error_bound)),
+                Err(error) => Err(EnclosureError::Pair { from: i, to: j, error }),
+            }
+        })
     }
 
     /// How many surfaces it has.
@@ -252,6 +312,13 @@ impl Enclosure {
         let terms = self.exchange[surface].iter().zip(leaving).map(|(exchange, m)| exchange * m);
         terms.collect::<Sum>().value() / self.areas_m2[surface]
     }
+}
+
+fn area_m2(face: &Polygon) -> f64 {
+    let vertices = face.vertices();
+    let first = vertices[0];
+    let fan = vertices.windows(2).map(|edge| (edge[0] - first).cross(edge[1] - first));
+    fan.fold(glam::DVec3::ZERO, |sum, triangle| sum + triangle).length() / 2.0
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Form factors of pairs of finite diffuse surfaces, F₁₂: the part of the flux leaving 1 that reaches 2
 //! directly. The reference families in closed form or as a one-dimensional integral of a positive
-//! function, any two flat polygons by a boundary integral. Reciprocity: A₁F₁₂ = A₂F₂₁. What stands
-//! between the surfaces is not known here.
+//! function, any two flat polygons by a boundary integral, past occluders by cubature of what each point
+//! sees. Reciprocity: A₁F₁₂ = A₂F₂₁.
 //!
 //! Howell's catalog (*A Catalog of Radiation Heat Transfer Configuration Factors*) numbers the
 //! families C-1 and so on. Its closed forms cancel by the square to the fourth power of gap over size;
@@ -11,14 +11,20 @@
 //! rig for baffles, enclosures and stray light.
 
 mod contour;
+mod events;
 mod long;
+mod occluded;
 mod pairs;
+mod parts;
 mod polygons;
-
 mod rectangles;
+mod rim;
 mod round;
+mod sight;
 
 pub use long::{parallel_cylinders, strips};
+pub(crate) use occluded::between_fronts;
+pub use occluded::polygons_occluded;
 pub use polygons::{polygons, throughput_of_polygons};
 pub use rectangles::{
     aligned_rectangles, parallel_rectangles, perpendicular_offset_rectangles,

@@ -40,14 +40,23 @@ pub fn polygons(
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
     let pair = Pair::new(from, to)?;
-    let Some(facing) = pair.facing() else { return Ok(Estimate::closed(0.0, 0.0)) };
+    let Some(facing) = pair.facing(Faces::Both) else { return Ok(Estimate::closed(0.0, 0.0)) };
+    unhindered(&pair, &facing, tolerance)
+}
+
+/// The same for the parts that face each other.
+pub(super) fn unhindered(
+    pair: &Pair,
+    facing: &Facing,
+    tolerance: Tolerance,
+) -> Result<Estimate, EstimateError> {
     let area = pair.normal_from.length() / 2.0;
     let wanted = tolerance.before_factor(1.0 / area);
-    let by_contour = contour::exchange(&facing, wanted);
+    let by_contour = contour::exchange(facing, wanted);
     let exchanged = match by_contour {
         Ok(exchanged) => exchanged,
         Err(EstimateError::Unmet { estimate: cancelled, .. }) => {
-            let positive = match pairs::exchange(&facing, wanted) {
+            let positive = match pairs::exchange(facing, wanted) {
                 Ok(estimate) | Err(EstimateError::Unmet { estimate, .. }) => estimate,
                 Err(error) => return Err(error),
             };
@@ -89,13 +98,24 @@ pub fn throughput_of_polygons(
 }
 
 /// Both polygons in a unit of length that is a power of two, near the first one's first vertex.
-struct Pair {
-    from: Vec<DVec3>,
-    to: Vec<DVec3>,
+pub(super) struct Pair {
+    pub(super) from: Vec<DVec3>,
+    pub(super) to: Vec<DVec3>,
     /// Twice the area long, counter-clockwise around it.
-    normal_from: DVec3,
-    normal_to: DVec3,
+    pub(super) normal_from: DVec3,
+    pub(super) normal_to: DVec3,
+    /// The first vertex, in eighths.
+    origin: DVec3,
     exponent: i32,
+}
+
+/// Which faces of polygons act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Faces {
+    /// Those that they turn to each other.
+    Both,
+    /// Those around which their vertices run counter-clockwise.
+    Fronts,
 }
 
 /// What takes part of two polygons, in their order around the normals that they turn to each other.
@@ -108,7 +128,7 @@ pub(super) struct Facing {
 }
 
 impl Pair {
-    fn new(from: &Polygon, to: &Polygon) -> Result<Self, DomainError> {
+    pub(super) fn new(from: &Polygon, to: &Polygon) -> Result<Self, DomainError> {
         // By eighths, so that no difference overflows.
         let eighths = |polygon: &Polygon| polygon.vertices().iter().map(|v| *v / 8.0).collect();
         let (from, to): (Vec<DVec3>, Vec<DVec3>) = (eighths(from), eighths(to));
@@ -124,14 +144,38 @@ impl Pair {
         let (normal_from, normal_to) = (normal(&from), normal(&to));
         positive("area_from_m2", normal_from.length())?;
         positive("area_to_m2", normal_to.length())?;
-        Ok(Self { from, to, normal_from, normal_to, exponent: exponent + 3 })
+        Ok(Self { from, to, normal_from, normal_to, origin, exponent: exponent + 3 })
+    }
+
+    /// Another point in the same unit and place.
+    pub(super) fn near(&self, point_m: DVec3) -> DVec3 {
+        let from_origin = point_m / 8.0 - self.origin;
+        DVec3::from_array(from_origin.to_array().map(|x| libm::scalbn(x, 3 - self.exponent)))
+    }
+
+    /// Another length in the same unit.
+    pub(super) fn in_unit(&self, length_m: f64) -> f64 {
+        libm::scalbn(length_m, -self.exponent)
     }
 
     /// The parts that can see each other; none if there are none.
-    fn facing(&self) -> Option<Facing> {
+    pub(super) fn facing(&self, faces: Faces) -> Option<Facing> {
         let (normal_from, normal_to) = (self.normal_from.normalize(), self.normal_to.normalize());
-        let turn_from = side(self.from[0], normal_from, &self.to)?;
-        let turn_to = side(self.to[0], normal_to, &self.from)?;
+        let (turn_from, turn_to) = match faces {
+            Faces::Fronts => {
+                let in_front = |point, normal, others| side(point, normal, others) == Some(1.0);
+                let is_seen = in_front(self.from[0], normal_from, &self.to)
+                    && in_front(self.to[0], normal_to, &self.from);
+                if !is_seen {
+                    return None;
+                }
+                (1.0, 1.0)
+            }
+            Faces::Both => (
+                side(self.from[0], normal_from, &self.to)?,
+                side(self.to[0], normal_to, &self.from)?,
+            ),
+        };
         let turned = |vertices: &[DVec3], sign: f64| {
             let mut vertices = vertices.to_vec();
             if sign < 0.0 {
