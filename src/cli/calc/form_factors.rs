@@ -7,6 +7,7 @@ use radiometry::shape::Polygon;
 
 use super::inputs::Inputs;
 use super::quantity::{Answer, Input, Quantity, Refusal, Rounding, tolerance};
+use super::solid_angles::occluder;
 
 const R1: Input = Input::new("r1", "m");
 const R2: Input = Input::new("r2", "m");
@@ -177,14 +178,29 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         &[
             Input::new("from", "list of [x,y,z], m"),
             Input::new("to", "list of [x,y,z], m"),
-            Input::optional("relative_tolerance", "default 1e-10"),
+            Input::optional("occluders", "list of bodies as for occluded-projected-solid-angle"),
+            Input::optional(
+                "relative_tolerance",
+                "default 1e-10; with occluders 1e-6, of the factor without them",
+            ),
         ],
         "--from [[0,0,0],[1,0,0],[1,1,0],[0,1,0]] --to [[0,0,1],[0,1,1],[1,1,1],[1,0,1]] \
-         --relative-tolerance 1e-8",
+         --occluders [{\"kind\":\"sphere\",\"center\":[0.5,0.5,0.5],\"radius\":0.2}] \
+         --relative-tolerance 1e-4",
         |inputs| {
             let polygon = |name| Ok::<_, Refusal>(Polygon::new(inputs.vectors(name)?)?);
             let (from, to) = (polygon("from")?, polygon("to")?);
-            Ok(form_factor::polygons(&from, &to, tolerance(inputs)?)?.into())
+            if !inputs.has("occluders") {
+                return Ok(form_factor::polygons(&from, &to, tolerance(inputs)?)?.into());
+            }
+            let bodies = inputs.objects("occluders")?.into_iter().map(occluder);
+            let bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+            let tolerance = if inputs.has("relative_tolerance") {
+                tolerance(inputs)?
+            } else {
+                Tolerance::from_relative(1e-6)?
+            };
+            Ok(form_factor::polygons_occluded(&from, &to, &bodies, tolerance)?.into())
         },
     ),
 ];

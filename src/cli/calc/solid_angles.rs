@@ -230,7 +230,7 @@ fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
     }
 }
 
-fn occluder(body: Inputs<'_>) -> Result<Occluder, Refusal> {
+pub(super) fn occluder(body: Inputs<'_>) -> Result<Occluder, Refusal> {
     match body.text("kind")? {
         "polygon" => Ok(Occluder::Polygon(polygon(body)?)),
         "disk" => {
