@@ -8,6 +8,7 @@
 //! from +x towards +y.
 
 pub mod basis;
+pub mod beam;
 pub mod chart;
 pub mod convex;
 pub mod direction;
