@@ -16,6 +16,7 @@
 //! # Ok::<(), radiometry::DomainError>(())
 //! ```
 
+mod graded;
 mod incidence;
 mod window;
 
@@ -25,6 +26,10 @@ use crate::direction::normalised;
 use crate::domain::{DomainError, positive, within};
 use crate::error_free::{DoubleDouble, two_sum};
 
+pub use graded::{
+    ExponentialProfile, IndexField, IndexProfile, Leg, LinearProfile, Stop, Stratified,
+    StratifiedRay, TraceError, Traced, basic_radiance, radiance_in_medium, trace,
+};
 pub use incidence::Incidence;
 pub use window::Window;
 
@@ -233,6 +238,24 @@ impl Passage {
             (-(self.difference / sum) / sum).clamp(-1.0, 1.0)
         }
     }
+}
+
+/// The mirrored ray's unit vector, from the incident `direction` of any length and a `normal` of any
+/// length on the side that the ray comes from: d - 2 (d·n) n. The solid angle and the cosine to the
+/// normal stay, and so does the throughput of a beam. A direction that leads away from the
+/// interface is an error, and so are vectors without a direction.
+///
+/// ```
+/// use glam::DVec3;
+/// let mirrored = radiometry::interface::reflect(DVec3::new(0.6, 0.0, -0.8), DVec3::Z)?;
+/// assert!((mirrored - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
+pub fn reflect(direction: DVec3, normal: DVec3) -> Result<DVec3, DomainError> {
+    Incidence::between(direction, normal)?;
+    let unit = |vector: DVec3| normalised(vector).unwrap_or(DVec3::ZERO);
+    let (direction, normal) = (unit(direction), unit(normal));
+    Ok(unit(direction - 2.0 * direction.dot(normal) * normal))
 }
 
 fn pair((high, low): (f64, f64)) -> DoubleDouble {
