@@ -43,6 +43,8 @@ pub struct StratifiedRay<'a, P> {
 pub struct Leg {
     /// Where it ends, m: at the level asked for, or where the ray turns.
     pub end_level_m: f64,
+    /// Bound of its error, m: 0 but where the ray turns.
+    pub end_level_error_m: f64,
     /// Whether the ray turns there. It goes back as it came: mirrored.
     pub turns: bool,
     /// How far the ray gets along the layers: m for plane ones, for spherical ones the angle at their
@@ -217,7 +219,8 @@ impl<P: IndexProfile> StratifiedRay<'_, P> {
             let index = ray.medium.profile.index(level_m);
             index * (index * ray.medium.radius(level_m))
         })?;
-        Ok(Leg { end_level_m, turns: turning.is_some(), across, optical_path_m })
+        let end_level_error_m = if turning.is_some() { anchor.level_noise_m } else { 0.0 };
+        Ok(Leg { end_level_m, end_level_error_m, turns: turning.is_some(), across, optical_path_m })
     }
 
     fn start(&self) -> Anchor {
