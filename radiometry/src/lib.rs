@@ -13,6 +13,7 @@ pub mod chart;
 pub mod convex;
 pub mod direction;
 pub mod enclosure;
+pub mod environment;
 pub mod form_factor;
 pub mod interface;
 pub mod irradiance;

@@ -139,6 +139,11 @@ product!([W: Weighting] Exitance<W>, Area => RadiantFlux<W>);
 quotient!([W: Weighting] RadiantFlux<W>, Exitance<W> => Area);
 
 impl<W: Weighting> Radiance<W> {
+    /// That many of the unit of its weighting.
+    pub(crate) const fn from_amount(amount: f64) -> Self {
+        Self::new(amount)
+    }
+
     /// The number, in the unit of its weighting.
     pub(crate) const fn amount(self) -> f64 {
         self.0
