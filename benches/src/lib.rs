@@ -11,7 +11,10 @@ mod cases;
 mod counted;
 mod dice;
 mod document;
+pub mod integral;
+pub mod kernel;
 mod machine;
+pub mod picture;
 mod program;
 mod statistics;
 mod stopwatch;
@@ -25,7 +28,7 @@ pub use document::Section;
 pub use machine::{Machine, file_system_of};
 pub use program::{Program, Run, copy_example, edit};
 pub use statistics::{binomial_band, rms, rms_band};
-pub use stopwatch::{Spread, repeat, repeat_together, timed};
+pub use stopwatch::{Spread, call_ns, call_ns_in, repeat, repeat_together, timed};
 pub use table::Table;
 
 /// Why something could not be measured; the program then exits with 1.
