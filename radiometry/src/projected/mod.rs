@@ -10,7 +10,7 @@ mod occluded;
 mod outline;
 mod polygon;
 mod seen;
-mod smooth;
+pub(crate) mod smooth;
 mod sphere;
 
 use core::f64::consts::PI;

@@ -16,7 +16,7 @@ const DEPTH_MAX: u32 = 60;
 const HALVINGS_MAX: u32 = 20_000;
 
 /// ∫ f over [from, to]; 0 if the interval is empty, NaN where it does not settle.
-pub(super) fn integral(from: f64, to: f64, f: &impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn integral(from: f64, to: f64, f: &impl Fn(f64) -> f64) -> f64 {
     if from >= to {
         return 0.0;
     }

@@ -2,6 +2,8 @@
 //! of a cone about the receiver's normal. Written without the difference 1 - cos, which has no digits
 //! left for small cones. Orientation of the receiver beyond that is the room next door, `projected`.
 
+mod disk;
+mod elliptic;
 mod triangle;
 
 use core::f64::consts::{FRAC_PI_2, PI};
@@ -9,6 +11,7 @@ use core::f64::consts::{FRAC_PI_2, PI};
 use crate::domain::{DomainError, not_negative, within};
 use crate::quantity::{ProjectedSolidAngle, SolidAngle};
 
+pub use disk::{disk_from, disk_off_axis};
 pub use triangle::{polygon, triangle, triangle_signed};
 
 /// The largest solid angle: 4π sr.
@@ -73,7 +76,8 @@ pub fn annulus(inner_rad: f64, outer_rad: f64) -> Result<SolidAngle, DomainError
 }
 
 /// Solid angle of a disk seen from its axis: 2π r²/(s(s+d)), s = √(r²+d²). A disk of no radius
-/// has none, from any distance; one touched by the receiver fills the hemisphere.
+/// has none, from any distance; one touched by the receiver fills the hemisphere. From beside the
+/// axis: [`disk_off_axis`].
 ///
 /// ```
 /// use radiometry::solid_angle::disk;

@@ -78,6 +78,51 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         },
     },
     Quantity {
+        name: "off-axis-disk-solid-angle",
+        inputs: &[RADIUS, DISTANCE, Input::new("offset", "m, of the point from the disk's axis")],
+        unit: SR,
+        example: "--radius 1 --distance 1 --offset 0.5",
+        rounding: Rounding::Relative(1e-13),
+        compute: |inputs| {
+            let (radius, distance) = (inputs.number("radius")?, inputs.number("distance")?);
+            let offset = inputs.number("offset")?;
+            Ok(solid_angle::disk_off_axis(radius, distance, offset)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "solid-angle-of-disk",
+        inputs: &[POINT, CENTER, Input::new("axis", "x,y,z of any length"), RADIUS],
+        unit: SR,
+        example: "--point 0,0,0 --center 0.5,0,1 --axis 0,0,1 --radius 1",
+        rounding: Rounding::Relative(1e-13),
+        compute: |inputs| {
+            let disk = disk(inputs, inputs.direction("axis")?)?;
+            Ok(solid_angle::disk_from(inputs.vector("point")?, &disk)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "sphere-solid-angle",
+        inputs: &[RADIUS, Input::new("distance", "m, to its centre, from outside")],
+        unit: SR,
+        example: "--radius 1 --distance 2",
+        rounding: Rounding::Relative(2e-15),
+        compute: |inputs| {
+            let (radius, distance) = (inputs.number("radius")?, inputs.number("distance")?);
+            Ok(solid_angle::sphere(radius, distance)?.sr().into())
+        },
+    },
+    Quantity {
+        name: "polygon-solid-angle",
+        inputs: &[POINT, Input::new("vertices", "list of [x,y,z], m, in one plane")],
+        unit: SR,
+        example: "--point 0,0,0 --vertices [[-1,-1,1],[1,-1,1],[1,1,1],[-1,1,1]]",
+        rounding: Rounding::Relative(1e-12),
+        compute: |inputs| {
+            let polygon = Polygon::new(inputs.vectors("vertices")?)?;
+            Ok(solid_angle::polygon(inputs.vector("point")?, &polygon)?.sr().into())
+        },
+    },
+    Quantity {
         name: "triangle-solid-angle",
         inputs: &[A, B, C],
         unit: SR,
