@@ -30,6 +30,7 @@ mod domain;
 mod error_free;
 mod estimate;
 mod polynomial;
+mod transcendental;
 mod wide;
 
 pub use domain::DomainError;
