@@ -4,19 +4,13 @@ use core::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::legs::{Edge, edges, legs};
 use super::polygons::Facing;
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::quadrature::adaptive_noisy;
 
 /// Roundings in one edge's term, in units of its parts.
 const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
-
-/// An edge: its start, its direction, its length.
-struct Edge {
-    start: DVec3,
-    along: DVec3,
-    length: f64,
-}
 
 /// A₁F₁₂ = (1/2π) ∮∮ ln r dr₁·dr₂, the loops running around the normals that face each other.
 #[expect(
@@ -29,11 +23,14 @@ pub(super) fn exchange(facing: &Facing, tolerance: Tolerance) -> Result<Estimate
     // The smaller boundary outside: the roundings of a long edge's term then count for little length.
     let around = |edges: &[Edge]| edges.iter().map(|edge| edge.length).sum::<f64>();
     let (outer, inner) = if around(&from) <= around(&to) { (from, to) } else { (to, from) };
-    let places: Vec<f64> = (0..=outer.len()).map(|place| place as f64).collect();
+    let legs = legs(&outer, &inner);
+    let places: Vec<f64> = (0..=legs.len()).map(|place| place as f64).collect();
     let at = |place: f64| {
-        let index = (place as usize).min(outer.len() - 1);
-        let edge = &outer[index];
-        let point = edge.start + edge.along * (edge.length * (place - index as f64));
+        let index = (place as usize).min(legs.len() - 1);
+        let leg = &legs[index];
+        let edge = &outer[leg.edge];
+        let (share, growth) = leg.share(place - index as f64);
+        let point = edge.start + edge.along * (edge.length * leg.reach.mul_add(share, leg.near));
         let (mut sum, mut noise) = (0.0, 0.0);
         for other in &inner {
             let cosine = edge.along.dot(other.along);
@@ -43,19 +40,10 @@ pub(super) fn exchange(facing: &Facing, tolerance: Tolerance) -> Result<Estimate
                 noise += cosine.abs() * rounding;
             }
         }
-        let scale = edge.length / (2.0 * PI);
+        let scale = edge.length * leg.reach.abs() * growth / (2.0 * PI);
         (scale * sum, scale * noise)
     };
     adaptive_noisy(at, &places, tolerance)
-}
-
-fn edges(vertices: &[DVec3]) -> Vec<Edge> {
-    let ends = (0..vertices.len()).map(|i| (vertices[i], vertices[(i + 1) % vertices.len()]));
-    ends.filter_map(|(start, end)| {
-        let length = (end - start).length();
-        (length > 0.0).then(|| Edge { start, along: (end - start) / length, length })
-    })
-    .collect()
 }
 
 /// ∫ ln r along an edge, and a bound of its rounding. With u along the edge from the foot of the

@@ -11,7 +11,9 @@
 //! rig for baffles, enclosures and stray light.
 
 mod contour;
+mod contour_wide;
 mod events;
+mod legs;
 mod long;
 mod occluded;
 mod pairs;

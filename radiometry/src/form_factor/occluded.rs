@@ -175,7 +175,7 @@ fn past(
     let allowed = tolerance.allowed(most);
     let wanted = Tolerance::new(0.0, allowed, tolerance.budget())?;
 
-    let [area_from, area_to] = [pair.normal_from, pair.normal_to].map(|n| n.length() / 2.0);
+    let (area_from, area_to) = (pair.area_from, pair.area_to);
     let parts = |vertices: &[DVec3], normal: DVec3, own: DVec3, other: (DVec3, DVec3)| {
         let (point, facing) = other;
         // Parts of the whole polygon, since what is clipped may hang together by bare edges.

@@ -4,6 +4,7 @@
 use core::cmp::Ordering;
 use core::f64::consts::PI;
 use std::collections::BinaryHeap;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -11,9 +12,10 @@ use super::polygons::Facing;
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::quadrature::{Sum, gauss_legendre};
 
-/// Nodes a side of the rule that counts, and of the one that it is compared with.
-const NODES: [usize; 2] = [5, 4];
-const EVALUATIONS: usize = 625 + 256;
+/// Nodes a side of the rule that counts, and of the one that it is compared with: for all pairs at
+/// first, and for those that are not far enough apart for that.
+const NODES: [[usize; 2]; 2] = [[5, 4], [8, 6]];
+const EVALUATIONS: [usize; 2] = [625 + 256, 4096 + 1296];
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// The bound in units of the difference of the rules.
 const CAUTION: f64 = 4.0;
@@ -32,17 +34,14 @@ struct Piece {
 /// largest bound cut across its longest edge. The polygons are taken as signed fans, which stay
 /// within their convex hulls and so in front of each other.
 pub(super) fn exchange(facing: &Facing, tolerance: Tolerance) -> Result<Estimate, EstimateError> {
-    let rules = NODES.map(|nodes| {
-        let onto_unit = |(node, weight)| (f64::midpoint(1.0, node), 0.5 * weight);
-        gauss_legendre(nodes).into_iter().map(onto_unit).collect::<Vec<_>>()
-    });
+    let [first, further] = rules();
     let mut pieces = BinaryHeap::new();
     for from in fan(&facing.from) {
         for to in fan(&facing.to) {
-            pieces.push(Piece::new([from, to], facing, &rules)?);
+            pieces.push(Piece::new([from, to], facing, first)?);
         }
     }
-    let mut evaluations = pieces.len() * EVALUATIONS;
+    let mut evaluations = pieces.len() * EVALUATIONS[0];
     loop {
         let value = pieces.iter().map(|piece| piece.value).collect::<Sum>().value();
         let bound = pieces.iter().map(|piece| piece.bound).sum::<f64>();
@@ -52,16 +51,28 @@ pub(super) fn exchange(facing: &Facing, tolerance: Tolerance) -> Result<Estimate
             return Ok(estimate);
         }
         for _ in 0..=pieces.len() / 8 {
-            if evaluations + 2 * EVALUATIONS > tolerance.budget() {
+            if evaluations + 2 * EVALUATIONS[1] > tolerance.budget() {
                 return estimate.within(tolerance);
             }
             let Some(worst) = pieces.pop() else { return estimate.within(tolerance) };
             for half in worst.halves() {
-                pieces.push(Piece::new(half, facing, &rules)?);
+                pieces.push(Piece::new(half, facing, further)?);
             }
-            evaluations += 2 * EVALUATIONS;
+            evaluations += 2 * EVALUATIONS[1];
         }
     }
+}
+
+/// On [0, 1].
+type Rules = [Vec<(f64, f64)>; 2];
+
+fn rules() -> &'static [Rules; 2] {
+    static RULES: OnceLock<[Rules; 2]> = OnceLock::new();
+    RULES.get_or_init(|| {
+        let onto_unit = |(node, weight)| (f64::midpoint(1.0, node), 0.5 * weight);
+        let rule = |nodes| gauss_legendre(nodes).into_iter().map(onto_unit).collect();
+        NODES.map(|both| both.map(rule))
+    })
 }
 
 fn fan(vertices: &[DVec3]) -> impl Iterator<Item = Triangle> + '_ {
@@ -72,7 +83,7 @@ impl Piece {
     fn new(
         triangles: [Triangle; 2],
         facing: &Facing,
-        rules: &[Vec<(f64, f64)>; 2],
+        rules: &Rules,
     ) -> Result<Self, EstimateError> {
         let mut sums = [0.0; 2];
         for (sum, rule) in sums.iter_mut().zip(rules) {

@@ -5,10 +5,12 @@ use core::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{contour, integrated, pairs};
+use super::{contour, contour_wide, integrated, pairs};
 use crate::domain::{DomainError, positive};
+use crate::error_free::DoubleDouble;
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::shape::Polygon;
+use crate::wide::WideVec;
 
 /// Nearer to a plane than this, in units of the extent of both polygons, is in it: four roundings.
 const IN_PLANE: f64 = 4.0 * f64::EPSILON;
@@ -21,8 +23,10 @@ const IN_PLANE: f64 = 4.0 * f64::EPSILON;
 /// that of b.
 ///
 /// By Stokes' theorem A₁F₁₂ = (1/2π) ∮∮ ln r dr₁·dr₂ (Sparrow 1963), the inner integral over an edge in
-/// closed form, the outer by adaptive quadrature. Where that cancels, far apart and at grazing sight,
-/// cubature of the positive kernel over pairs of triangles takes over.
+/// closed form, the outer by adaptive quadrature whose places crowd where the boundaries come near each
+/// other. Where that cancels, far apart, cubature of the positive kernel over pairs of triangles takes
+/// over; side by side, in thin gaps and at grazing sight, the same boundary integral in
+/// double-double.
 ///
 /// ```
 /// use glam::DVec3;
@@ -50,25 +54,34 @@ pub(super) fn unhindered(
     facing: &Facing,
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
-    let area = pair.normal_from.length() / 2.0;
+    let area = pair.area_from;
     let wanted = tolerance.before_factor(1.0 / area);
-    let by_contour = contour::exchange(facing, wanted);
-    let exchanged = match by_contour {
-        Ok(exchanged) => exchanged,
-        Err(EstimateError::Unmet { estimate: cancelled, .. }) => {
-            let positive = match pairs::exchange(facing, wanted) {
-                Ok(estimate) | Err(EstimateError::Unmet { estimate, .. }) => estimate,
-                Err(error) => return Err(error),
-            };
-            let evaluations = cancelled.evaluations + positive.evaluations;
-            let better =
-                if positive.error_bound < cancelled.error_bound { positive } else { cancelled };
-            Estimate { evaluations, ..better }
-        }
-        Err(error) => return Err(error),
+    let mut best = match contour::exchange(facing, wanted) {
+        Err(EstimateError::Unmet { estimate, .. }) => estimate,
+        other => return integrated(other, 0.0, 1.0 / area, tolerance),
     };
-    integrated(Ok(exchanged), 0.0, 1.0 / area, tolerance)
+    let mut other_ways: [Way; 2] = [contour_wide::exchange, pairs::exchange];
+    // The positive kernel is smooth from afar.
+    if facing.is_far() {
+        other_ways.reverse();
+    }
+    for way in other_ways {
+        let found = match way(facing, wanted) {
+            Ok(estimate) | Err(EstimateError::Unmet { estimate, .. }) => estimate,
+            Err(error) => return Err(error),
+        };
+        let evaluations = best.evaluations + found.evaluations;
+        let better = if found.error_bound < best.error_bound { found } else { best };
+        best = Estimate { evaluations, ..better };
+        if best.meets(wanted) {
+            break;
+        }
+    }
+    integrated(Ok(best), 0.0, 1.0 / area, tolerance)
 }
+
+/// To find an exchange.
+type Way = fn(&Facing, Tolerance) -> Result<Estimate, EstimateError>;
 
 /// Throughput of all rays from one polygon to another, m²·sr: π A₁ F₁₂; conventions as in
 /// [`polygons`].
@@ -90,7 +103,7 @@ pub fn throughput_of_polygons(
     tolerance: Tolerance,
 ) -> Result<Estimate, EstimateError> {
     let pair = Pair::new(from, to)?;
-    let area_m2 = libm::scalbn(pair.normal_from.length() / 2.0, 2 * pair.exponent);
+    let area_m2 = libm::scalbn(pair.area_from, 2 * pair.exponent);
     if !area_m2.is_finite() {
         return Err(DomainError::Overflow { result: "area_m2" }.into());
     }
@@ -104,6 +117,11 @@ pub(super) struct Pair {
     /// Twice the area long, counter-clockwise around it.
     pub(super) normal_from: DVec3,
     pub(super) normal_to: DVec3,
+    pub(super) area_from: f64,
+    pub(super) area_to: f64,
+    /// Without the rounding of the differences from the origin.
+    wide_from: Vec<WideVec>,
+    wide_to: Vec<WideVec>,
     /// The first vertex, in eighths.
     origin: DVec3,
     exponent: i32,
@@ -122,6 +140,9 @@ pub(super) enum Faces {
 pub(super) struct Facing {
     pub(super) from: Vec<DVec3>,
     pub(super) to: Vec<DVec3>,
+    /// The same vertices with all their digits.
+    pub(super) wide_from: Vec<WideVec>,
+    pub(super) wide_to: Vec<WideVec>,
     /// Of length 1.
     pub(super) normal_from: DVec3,
     pub(super) normal_to: DVec3,
@@ -136,15 +157,30 @@ impl Pair {
         let extent = from.iter().chain(&to).map(|v| (*v - origin).abs().max_element());
         let extent = positive("extent_m", extent.fold(0.0, f64::max))?;
         let exponent = libm::ilogb(extent);
-        let near = |vertex: &DVec3| {
-            DVec3::from_array((*vertex - origin).to_array().map(|x| libm::scalbn(x, -exponent)))
+        let near = |vertices: &[DVec3]| -> Vec<WideVec> {
+            let relative = |vertex: &DVec3| WideVec::difference(*vertex, origin).scaled(-exponent);
+            vertices.iter().map(relative).collect()
         };
-        let from: Vec<DVec3> = from.iter().map(near).collect();
-        let to: Vec<DVec3> = to.iter().map(near).collect();
-        let (normal_from, normal_to) = (normal(&from), normal(&to));
+        let (wide_from, wide_to) = (near(&from), near(&to));
+        let (twice_from, from) = (vector_area(&wide_from), rounded(&wide_from));
+        let (twice_to, to) = (vector_area(&wide_to), rounded(&wide_to));
+        let (normal_from, normal_to) = (twice_from.to_vec(), twice_to.to_vec());
         positive("area_from_m2", normal_from.length())?;
         positive("area_to_m2", normal_to.length())?;
-        Ok(Self { from, to, normal_from, normal_to, origin, exponent: exponent + 3 })
+        let area_from = twice_from.length().to_f64() / 2.0;
+        let area_to = twice_to.length().to_f64() / 2.0;
+        Ok(Self {
+            from,
+            to,
+            normal_from,
+            normal_to,
+            area_from,
+            area_to,
+            wide_from,
+            wide_to,
+            origin,
+            exponent: exponent + 3,
+        })
     }
 
     /// Another point in the same unit and place.
@@ -176,7 +212,7 @@ impl Pair {
                 side(self.to[0], normal_to, &self.from)?,
             ),
         };
-        let turned = |vertices: &[DVec3], sign: f64| {
+        let turned = |vertices: &[WideVec], sign: f64| {
             let mut vertices = vertices.to_vec();
             if sign < 0.0 {
                 vertices.reverse();
@@ -184,17 +220,38 @@ impl Pair {
             vertices
         };
         let (facing_from, facing_to) = (turn_from * normal_from, turn_to * normal_to);
-        let from = in_front(self.to[0], facing_to, &turned(&self.from, turn_from));
-        let to = in_front(self.from[0], facing_from, &turned(&self.to, turn_to));
+        let wide_from = in_front(self.to[0], facing_to, &turned(&self.wide_from, turn_from));
+        let wide_to = in_front(self.from[0], facing_from, &turned(&self.wide_to, turn_to));
+        let (from, to) = (rounded(&wide_from), rounded(&wide_to));
         let enough = from.len() > 2 && to.len() > 2;
-        enough.then_some(Facing { from, to, normal_from: facing_from, normal_to: facing_to })
+        let (normal_from, normal_to) = (facing_from, facing_to);
+        enough.then_some(Facing { from, to, wide_from, wide_to, normal_from, normal_to })
     }
 }
 
+impl Facing {
+    /// Whether the polygons are farther from each other than they are large.
+    fn is_far(&self) -> bool {
+        let ball = |vertices: &[DVec3]| {
+            let sum = vertices.iter().fold(DVec3::ZERO, |sum, x| sum + *x);
+            let center = sum / vertices.len() as f64;
+            let radius = vertices.iter().map(|x| x.distance(center)).fold(0.0, f64::max);
+            (center, radius)
+        };
+        let ((from, from_radius), (to, to_radius)) = (ball(&self.from), ball(&self.to));
+        from.distance(to) > 3.0 * (from_radius + to_radius)
+    }
+}
+
+fn rounded(vertices: &[WideVec]) -> Vec<DVec3> {
+    vertices.iter().map(|vertex| vertex.to_vec()).collect()
+}
+
 /// The vector area, doubled (Newell), from the first vertex.
-fn normal(vertices: &[DVec3]) -> DVec3 {
-    let fan = vertices.windows(2).map(|edge| (edge[0] - vertices[0]).cross(edge[1] - vertices[0]));
-    fan.fold(DVec3::ZERO, |sum, triangle| sum + triangle)
+fn vector_area(vertices: &[WideVec]) -> WideVec {
+    let first = vertices[0];
+    let fan = vertices.windows(2).map(|edge| edge[0].sub(first).cross(edge[1].sub(first)));
+    fan.fold(WideVec::from_vec(DVec3::ZERO), WideVec::add)
 }
 
 fn height(point: DVec3, normal: DVec3, vertex: DVec3) -> f64 {
@@ -215,13 +272,15 @@ fn side(point: DVec3, normal: DVec3, vertices: &[DVec3]) -> Option<f64> {
 /// The part of a polygon in front of a plane (Sutherland and Hodgman 1974). Of one that is not convex
 /// the parts stay joined by edges in the plane, there and back, which the boundary integral does not
 /// notice.
-fn in_front(point: DVec3, normal: DVec3, vertices: &[DVec3]) -> Vec<DVec3> {
+fn in_front(point: DVec3, normal: DVec3, vertices: &[WideVec]) -> Vec<WideVec> {
+    let above = |vertex: &WideVec| height(point, normal, vertex.to_vec());
     let mut kept = Vec::with_capacity(vertices.len() + 2);
     for (i, end) in vertices.iter().enumerate() {
-        let start = vertices[(i + vertices.len() - 1) % vertices.len()];
-        let (above_start, above_end) = (height(point, normal, start), height(point, normal, *end));
+        let start = &vertices[(i + vertices.len() - 1) % vertices.len()];
+        let (above_start, above_end) = (above(start), above(end));
         if (above_start < 0.0 && above_end > 0.0) || (above_start > 0.0 && above_end < 0.0) {
-            kept.push(start + (*end - start) * (above_start / (above_start - above_end)));
+            let part = DoubleDouble::from_f64(above_start / (above_start - above_end));
+            kept.push(start.add(end.sub(*start).times(part)));
         }
         if above_end >= 0.0 {
             kept.push(*end);

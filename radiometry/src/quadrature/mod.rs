@@ -39,8 +39,26 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     rule
 }
 
+/// The same rule on [0, 1], with 32 digits.
+pub(crate) fn wide_gauss_legendre(n: usize) -> Vec<(DoubleDouble, DoubleDouble)> {
+    let one = DoubleDouble::from_f64(1.0);
+    let mut rule = Vec::with_capacity(n);
+    for i in 0..n {
+        let mirrored = n - 1 - i;
+        let (node, weight) = wide_node_and_weight(n, i.min(mirrored));
+        let node = if i <= mirrored { one.sub(node) } else { one.add(node) };
+        rule.push((node.scaled(-1), weight.scaled(-1)));
+    }
+    rule
+}
+
 /// The i-th node from the right end, and its weight 2(1-x²)/(n Pₙ₋₁(x))².
 fn node_and_weight(n: usize, i: usize) -> (f64, f64) {
+    let (node, weight) = wide_node_and_weight(n, i);
+    (node.to_f64(), weight.to_f64())
+}
+
+fn wide_node_and_weight(n: usize, i: usize) -> (DoubleDouble, DoubleDouble) {
     /// Newton doubles the digits: from the start's 3 to 32 in four, and one to spare.
     const STEPS: usize = 5;
     let order = n as f64;
@@ -57,7 +75,7 @@ fn node_and_weight(n: usize, i: usize) -> (f64, f64) {
     let (_, before) = legendre_pair(n, x);
     let scaled = DoubleDouble::from_f64(order).mul(before);
     let weight = DoubleDouble::from_f64(2.0).mul(one.sub(x.mul(x))).div(scaled.mul(scaled));
-    (x.to_f64(), weight.to_f64())
+    (x, weight)
 }
 
 /// Pₙ and Pₙ₋₁ at x.
