@@ -7,9 +7,10 @@ use firmware_protocol::{AxisIdentity, Board, BoardFault, Illumination, Instant, 
 
 use crate::Compiled;
 use crate::chance::mix;
-use crate::detector::Stages;
 use crate::mechanics::{Axis, SeenRay, forward};
 use crate::optics;
+use crate::stage::Stages;
+use crate::time::Interval;
 
 /// A simulated rig's hardware. It answers after the fact, so that a device core is woken when
 /// something ends and not for every ADC reading.
@@ -24,6 +25,8 @@ pub struct SimulatedBoard {
     /// The axis of each channel.
     axis_of_channel: [usize; 4],
     stages: Stages,
+    /// The time of one ADC reading.
+    reading_s: f64,
     dwell: Dwelling,
 }
 
@@ -57,6 +60,7 @@ impl SimulatedBoard {
             axes: core::array::from_fn(|axis| Axis::at_boot(&compiled.axes[axis])),
             axis_of_channel,
             stages: compiled.stages(),
+            reading_s: 1.0 / f64::from(nominal.detector.adc_rate_hz),
             dwell: Dwelling {
                 illumination: Illumination { reading: 0, gain: 0, shutter: Shutter::Closed },
                 current_a: None,
@@ -159,14 +163,18 @@ impl Board for SimulatedBoard {
         }
     }
 
-    fn begin_dwell(&mut self, _now: Instant, illumination: Illumination) {
+    fn prepare_dwell(&mut self, now: Instant, illumination: Illumination) {
+        self.stages.prepare(now, illumination);
+    }
+
+    fn begin_dwell(&mut self, now: Instant, illumination: Illumination) {
         self.dwell = Dwelling { illumination, current_a: None };
-        self.stages.begin(illumination.reading);
+        self.stages.begin(now, illumination);
     }
 
     fn convert(&mut self, now: Instant) -> Result<i32, BoardFault> {
         let light_a = self.photocurrent_a(now);
-        let current_a = self.stages.pass(light_a);
+        let current_a = self.stages.pass(Interval::ending(now, self.reading_s), light_a);
         let gain = self.dwell.illumination.gain;
         self.compiled.amplifier.convert(gain, current_a).ok_or(BoardFault::Detector)
     }

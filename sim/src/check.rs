@@ -3,10 +3,14 @@
 use firmware_protocol::AXES_MAX;
 
 use crate::simulated::AXIS_NAMES;
-use crate::{CompileError, Nominal, Terms};
+use crate::{CompileError, Nominal, Simulated, Terms};
 
 /// Refuses numbers that no rig and no plan has.
-pub(crate) fn check(nominal: &Nominal, terms: &Terms) -> Result<(), CompileError> {
+pub(crate) fn check(
+    nominal: &Nominal,
+    simulated: &Simulated,
+    terms: &Terms,
+) -> Result<(), CompileError> {
     check_terms(terms)?;
     let channels: [u8; 4] = core::array::from_fn(|i| nominal.axes[i].channel);
     let mut sorted = channels;
@@ -39,6 +43,10 @@ pub(crate) fn check(nominal: &Nominal, terms: &Terms) -> Result<(), CompileError
     }
     let detector = &nominal.detector;
     not_negative("read noise".into(), detector.read_noise_a)?;
+    if simulated.detector.flicker.is_some() && detector.read_noise_a == 0.0 {
+        let (key, other) = ("simulated.flicker_noise.corner_hz", "a detector.read_noise_a above 0");
+        return Err(CompileError::Contradiction(key, other));
+    }
     positive("adc rate".into(), f64::from(detector.adc_rate_hz))?;
     let bits = f64::from(detector.adc_bits);
     positive("adc bits".into(), if (2.0..=32.0).contains(&bits) { bits } else { -bits })?;

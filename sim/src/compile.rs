@@ -12,11 +12,13 @@ use radiometry::throughput::coaxial_disks;
 
 use crate::chance::draw;
 use crate::check::check;
-use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C, Stages};
+use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
 use crate::field::Field;
 use crate::mechanics::{self, AxisTruth};
 use crate::optics::{self, Optics};
+use crate::stage::Stages;
+use crate::time;
 use crate::{Nominal, NominalDetector, Quantity, Region, Scene, Simulated, Terms, Truth};
 
 /// A rig as it is: what the host will never see but through its readings.
@@ -30,8 +32,10 @@ pub struct Compiled {
     pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
     pub(crate) current_per_radiance: f64,
+    /// Photocurrent per flux as drawn, A·W⁻¹ (or A·lm⁻¹).
+    pub(crate) responsivity: f64,
     pub(crate) amplifier: Amplifier,
-    chosen: Chosen,
+    pub(crate) chosen: Chosen,
     region: Region,
     tolerance: f64,
 }
@@ -41,6 +45,8 @@ pub struct Compiled {
 pub enum CompileError {
     /// The axes' channels are not 0 to 3, each once.
     Channels([u8; 4]),
+    /// Keys that contradict each other: the one, and what it asks of the other.
+    Contradiction(&'static str, &'static str),
     /// A length of the detector, or its responsivity, came out of the draw at or below zero: its
     /// uncertainty is as large as itself. Name, value drawn.
     Drawn(&'static str, f64),
@@ -106,18 +112,21 @@ pub fn compile(
         let (scene, rig) = (scene.quantity(), nominal.quantity);
         return Err(CompileError::Quantity { scene, rig });
     }
-    check(&nominal, terms)?;
+    check(&nominal, &simulated, terms)?;
     let scene = Arc::new(scene);
     let setting = Setting::new(&scene, &nominal, &simulated, terms)?;
     let tolerance = terms.tolerance.unwrap_or_else(|| setting.relative_noise() * PART_OF_NOISE);
     let mut candidates = optics::candidates(&setting);
     candidates.extend(mechanics::candidates(&setting));
+    candidates.extend(time::candidates(&setting));
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
     let departing = detector::departing(&nominal.detector, &chosen);
     let (region, optics) = (setting.region, optics::chosen(&setting, &chosen));
+    let (responsivity, throughput) = draw_optics(&departing, terms.seed)?;
     Ok(Compiled {
-        current_per_radiance: draw_optics(&departing, terms.seed)?,
+        current_per_radiance: responsivity * throughput,
+        responsivity,
         amplifier: draw_amplifier(&departing, terms.seed)?,
         axes: mechanics::axes(&nominal, &simulated, terms.seed, &chosen),
         scene,
@@ -227,9 +236,11 @@ impl Compiled {
 
     /// The stages that a photocurrent goes through on its way to the converter.
     pub(crate) fn stages(&self) -> Stages {
-        let detector = detector::departing(&self.nominal.detector, &self.chosen);
-        let dark_a = detector::dark_current_a(&self.simulated, &self.chosen);
-        Stages::chosen(&detector, dark_a, self.seed, &self.chosen)
+        let mut stages = Stages::default();
+        detector::stray_light(self, &mut stages);
+        time::stages(self, &mut stages);
+        detector::stages(self, &mut stages);
+        stages
     }
 }
 
@@ -246,7 +257,8 @@ fn draw_positive(
     if sound { Ok(drawn) } else { Err(CompileError::Drawn(name, drawn)) }
 }
 
-fn draw_optics(detector: &NominalDetector, seed: u64) -> Result<f64, CompileError> {
+/// Responsivity and throughput.
+fn draw_optics(detector: &NominalDetector, seed: u64) -> Result<(f64, f64), CompileError> {
     let drawn = |name, nominal, u| draw_positive(name, nominal, u, seed, 0);
     let responsivity = drawn(
         "responsivity",
@@ -258,7 +270,7 @@ fn draw_optics(detector: &NominalDetector, seed: u64) -> Result<f64, CompileErro
     let distance = drawn("distance", detector.distance_m, detector.u_distance_m)?;
     let throughput = coaxial_disks(pupil, spot, distance)
         .map_err(|_| CompileError::Drawn("throughput", distance))?;
-    Ok(responsivity * throughput.m2_sr())
+    Ok((responsivity, throughput.m2_sr()))
 }
 
 fn draw_amplifier(detector: &NominalDetector, seed: u64) -> Result<Amplifier, CompileError> {
@@ -276,6 +288,7 @@ impl fmt::Display for CompileError {
             Self::Channels(found) => {
                 write!(f, "the axes are on channels {found:?}, expected 0 to 3, each once")
             }
+            Self::Contradiction(key, other) => write!(f, "{key} without {other}"),
             Self::Drawn(name, value) => write!(
                 f,
                 "{name}: drawn as {value}, expected above 0: its stated uncertainty is too large"

@@ -1,6 +1,8 @@
 //! What readings there will be: how bright, how long, how noisy at least. Effects state their
 //! influence relative to them. It does not know the scene that they come from.
 
+use crate::compile::Setting;
+
 /// The readings of a region. Signals are the light's current in the axis's stead, without what
 /// the effects make of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +19,26 @@ pub(crate) struct Levels {
     run_s: f64,
 }
 
+/// How much smaller than the smallest radiance among a field's landmarks one between them may be.
+const BETWEEN_LANDMARKS: f64 = 0.5;
+
 impl Levels {
+    /// Of the region that effects are weighed in.
+    pub(crate) fn of(setting: &Setting<'_>) -> Self {
+        let landmarks = setting.field.landmarks(&setting.region);
+        let radiances = landmarks.iter().map(|ray| setting.field.radiance(ray));
+        let dimmest = radiances.fold(setting.brightest, f64::min) * BETWEEN_LANDMARKS;
+        Self {
+            lowest_a: dimmest * setting.current_per_radiance,
+            highest_a: setting.brightest_a(),
+            floor_a: setting.floor * setting.current_per_radiance,
+            rate_hz: setting.nominal.detector.adc_rate_hz,
+            dwell_s: setting.terms.dwell_s,
+            run_s: setting.terms.run_s,
+        }
+    }
+
+    #[cfg(test)]
     pub(crate) const fn new(
         (lowest_a, highest_a): (f64, f64),
         floor_a: f64,
@@ -27,9 +48,17 @@ impl Levels {
         Self { lowest_a, highest_a, floor_a, rate_hz, dwell_s, run_s }
     }
 
-    /// Influence of an additive current, amperes.
+    /// Influence of a current that is added, amperes; it may be negative. It is the largest where
+    /// the larger of the two readings, with and without it, is smallest.
     pub(crate) fn additive(&self, current_a: f64) -> f64 {
-        current_a.abs() / self.lowest_a.max(self.floor_a)
+        let signal_a = (-current_a / 2.0).clamp(self.lowest_a, self.highest_a.max(self.lowest_a));
+        let larger_a = signal_a.max((signal_a + current_a).abs());
+        current_a.abs() / larger_a.max(self.floor_a)
+    }
+
+    /// Influence of noise of this standard deviation, amperes, whatever the signal.
+    pub(crate) fn noise(&self, sigma_a: f64) -> f64 {
+        sigma_a / self.lowest_a.max(self.floor_a)
     }
 
     /// Influence of a change that is a part of the signal.
@@ -44,14 +73,14 @@ impl Levels {
         change_a(signal_a) / signal_a.max(self.floor_a)
     }
 
+    /// The smallest signal, amperes.
+    pub(crate) const fn lowest_a(&self) -> f64 {
+        self.lowest_a
+    }
+
     /// The largest signal, amperes.
     pub(crate) const fn highest_a(&self) -> f64 {
         self.highest_a
-    }
-
-    /// The noise floor, amperes.
-    pub(crate) const fn floor_a(&self) -> f64 {
-        self.floor_a
     }
 
     /// ADC readings a second.

@@ -16,7 +16,6 @@ mod compile;
 mod detector;
 mod effect;
 mod field;
-#[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod levels;
 mod mechanics;
 mod nominal;
@@ -25,17 +24,16 @@ mod pty;
 mod scene;
 mod serve;
 mod simulated;
-#[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod stage;
 mod switches;
 mod terms;
-#[allow(dead_code, unused_imports)] // the compiler is about to call for it
 mod time;
 mod truth;
 mod wire;
 
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
+pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use field::Ray;
 pub use mechanics::SeenRay;

@@ -3,12 +3,16 @@
 
 use spanned_toml::{Bounds, Problem, Table};
 
+use crate::DetectorFlaws;
+
 /// What the rig file can't know of a real rig. Everything absent is an effect absent; but limit
 /// switches every rig has.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
     /// Current without light, amperes; zero for none.
     pub dark_current_a: f64,
+    /// What else is wrong with the detector.
+    pub detector: DetectorFlaws,
     /// Where the axes stand at boot, as fractions of their travel from its lower end, in the
     /// order θ, φ, x, y. Drawn from the middle half of the travel where absent.
     pub start: [Option<f64>; 4],
@@ -39,6 +43,7 @@ impl Default for Simulated {
     fn default() -> Self {
         Self {
             dark_current_a: 0.0,
+            detector: DetectorFlaws::default(),
             start: [None; 4],
             limit_margin: LIMIT_MARGIN,
             faults: LinkFaults::default(),
@@ -61,6 +66,15 @@ impl Simulated {
         let dark = Bounds::between(-DARK_CURRENT_A_MAX, DARK_CURRENT_A_MAX);
         let fraction = Bounds::between(0.0, 1.0);
         let dark_current_a = table.number("dark_current_a", dark)?.unwrap_or(0.0);
+        let detector = DetectorFlaws::read(&table)?;
+        if detector.dark_drift_relative_per_h != 0.0 && dark_current_a == 0.0 {
+            return Err(table.problem(
+                "dark_drift_relative_per_h",
+                "a drift of a dark current that is not there",
+                "a dark_current_a other than 0 beside it",
+                "state the dark current, or remove its drift",
+            ));
+        }
         let mut start = [None; 4];
         if let Some(axes) = table.table("start_fraction_of_travel")? {
             for (start, axis) in start.iter_mut().zip(AXIS_NAMES) {
@@ -78,7 +92,7 @@ impl Simulated {
         }
         table.finish()?;
         let limit_margin = limit_margin.unwrap_or(LIMIT_MARGIN);
-        Ok(Self { dark_current_a, start, limit_margin, faults })
+        Ok(Self { dark_current_a, detector, start, limit_margin, faults })
     }
 }
 

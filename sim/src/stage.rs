@@ -13,7 +13,7 @@ pub(crate) trait Stage: fmt::Debug + Send {
     /// The detector is set for a dwell: shutter and gain change now.
     fn prepare(&mut self, _now: Instant, _next: Illumination) {}
     /// A dwell begins to integrate. Its readings' noise depends on its name alone.
-    fn begin(&mut self, _dwell: Illumination) {}
+    fn begin(&mut self, _now: Instant, _dwell: Illumination) {}
     /// The mean current over the interval of one ADC reading, amperes.
     fn pass(&mut self, at: Interval, current_a: f64) -> f64;
 }
@@ -33,9 +33,9 @@ impl Stages {
         }
     }
 
-    pub(crate) fn begin(&mut self, dwell: Illumination) {
+    pub(crate) fn begin(&mut self, now: Instant, dwell: Illumination) {
         for stage in &mut self.0 {
-            stage.begin(dwell);
+            stage.begin(now, dwell);
         }
     }
 

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{EXPONENT_MAX, Emitter, Scene, SceneError, Shape, photometric};
-use crate::Quantity;
+use crate::{Quantity, SourceOverTime};
 
 /// Reads a file that the scene names, by the name that it gives it: the caller knows relative to
 /// what. The error is a phrase for a person.
@@ -39,6 +39,9 @@ impl Scene {
                 "at least one [[emitter]]",
                 "a dark sample is an emitter with a level of 0",
             ));
+        }
+        if let Some(source) = root.table("source")? {
+            scene.over_time = SourceOverTime::read(source)?;
         }
         root.finish()?;
         for table in tables {

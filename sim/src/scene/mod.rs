@@ -9,7 +9,7 @@ mod photometric;
 mod shape;
 mod tabulated;
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 use core::fmt;
 
 use glam::DVec3;
@@ -19,7 +19,7 @@ pub use law::Law;
 pub use shape::Shape;
 pub use tabulated::{Tabulated, TabulatedError};
 
-use crate::{Quantity, Region};
+use crate::{Quantity, Region, SourceOverTime};
 
 /// A patch of the sample that emits.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,13 +116,22 @@ pub const EXPONENT_MAX: f64 = 20_000.0;
 pub struct Scene {
     quantity: Quantity,
     emitters: Vec<Emitter>,
+    over_time: SourceOverTime,
     notes: Vec<String>,
 }
 
 impl Scene {
     /// A dark plane; levels to come are in the quantity's unit.
     pub const fn new(quantity: Quantity) -> Self {
-        Self { quantity, emitters: Vec::new(), notes: Vec::new() }
+        let over_time = SourceOverTime { warm_up: None, mains_flicker: None };
+        Self { quantity, emitters: Vec::new(), over_time, notes: Vec::new() }
+    }
+
+    /// The scene with light that goes so with time.
+    #[must_use]
+    pub fn over_time_as(mut self, over_time: SourceOverTime) -> Self {
+        self.over_time = over_time;
+        self
     }
 
     /// The scene and one emitter more.
@@ -150,6 +159,18 @@ impl Scene {
     /// The patches, in the order of the file.
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
+    }
+
+    /// How all light goes with time.
+    pub const fn over_time(&self) -> &SourceOverTime {
+        &self.over_time
+    }
+
+    /// What all emitters send into the whole hemisphere, W or lm.
+    pub fn flux(&self) -> f64 {
+        let of_emitter =
+            |emitter: &Emitter| emitter.shape.area_m2() * emitter.exitance_within(FRAC_PI_2);
+        self.emitters.iter().map(of_emitter).sum()
     }
 
     /// What a person should know about the files that the scene refers to: irregularities that

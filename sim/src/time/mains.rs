@@ -5,6 +5,7 @@ use core::f64::consts::{PI, TAU};
 use spanned_toml::{Bounds, Problem, Table};
 
 use super::Interval;
+use super::effects::MAINS_FLICKER;
 use crate::chance::Stream;
 use crate::levels::Levels;
 use crate::stage::Stage;
@@ -25,8 +26,6 @@ pub struct MainsFlicker {
 
 /// A detector's amplifier follows no light that is faster.
 const FREQUENCY_HZ_MAX: f64 = 1e6;
-
-pub(crate) const MAINS_FLICKER: &str = "mains-flicker";
 
 /// More ADC readings than this are taken to end exactly when they should, not at the whole
 /// microsecond before.

@@ -5,18 +5,17 @@
 //! time is then another's, as it would be on a real rig, where the lamp burned on or cooled down
 //! meanwhile. Noise, which goes by the reading's name, is the same.
 
+mod effects;
 mod mains;
 mod warm_up;
 
+use firmware_protocol::Instant;
 use spanned_toml::{Problem, Table};
 
 pub use mains::MainsFlicker;
 pub use warm_up::WarmUp;
 
-pub(crate) use mains::Flickering;
-pub(crate) use warm_up::WarmingUp;
-
-use firmware_protocol::Instant;
+pub(crate) use effects::{candidates, stages};
 
 /// The table `[source]` of scene.toml: what the light of all emitters and lamps does with time.
 /// Everything absent is an effect absent.
