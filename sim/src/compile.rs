@@ -79,6 +79,8 @@ pub enum CompileError {
         /// All that there are.
         known: Vec<String>,
     },
+    /// The scene calls for something that is not simulated.
+    Unsupported(String),
 }
 
 /// What every candidate is weighed by. Nothing in it is drawn: what a rig is compiled to does not
@@ -113,6 +115,9 @@ pub fn compile(
         return Err(CompileError::Quantity { scene, rig });
     }
     check(&nominal, &simulated, terms)?;
+    if let Some(what) = scene.beyond_flat_emitters() {
+        return Err(CompileError::Unsupported(what));
+    }
     let scene = Arc::new(scene);
     let setting = Setting::new(&scene, &nominal, &simulated, terms)?;
     let tolerance = terms.tolerance.unwrap_or_else(|| setting.relative_noise() * PART_OF_NOISE);
@@ -312,6 +317,7 @@ impl fmt::Display for CompileError {
                 }
                 write!(f, " The effects here: {}", known.join(", "))
             }
+            Self::Unsupported(what) => write!(f, "not supported yet: {what}"),
         }
     }
 }

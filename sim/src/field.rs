@@ -6,7 +6,7 @@ use core::fmt;
 
 use glam::DVec3;
 
-use crate::{Region, Scene};
+use crate::{Emitter, Region, Scene};
 
 /// A ray from the sample to the detector, sample's frame. It is named by where it crosses the
 /// sample's plane and by its direction: light that leaves something above the plane goes along the
@@ -87,18 +87,18 @@ pub(crate) fn grid(region: &Region) -> Vec<Ray> {
 
 impl Field for Scene {
     fn radiance(&self, ray: &Ray) -> f64 {
-        self.emitters()
-            .iter()
-            .find(|emitter| emitter.shape().contains(ray.point.x, ray.point.y))
-            .map_or(0.0, |emitter| emitter.radiance_into(ray.direction))
+        let (x_m, y_m) = (ray.point.x, ray.point.y);
+        let on = |emitter: &&Emitter| emitter.shape().is_some_and(|shape| shape.contains(x_m, y_m));
+        let emitter = self.emitters().iter().find(on);
+        emitter.map_or(0.0, |emitter| emitter.radiance_into(x_m, y_m, ray.direction))
     }
 
     fn brightest(&self, region: &Region) -> f64 {
-        let seen = self
-            .emitters()
-            .iter()
-            .filter(|emitter| emitter.shape().point_within(region.x_m, region.y_m).is_some());
-        let peaks = seen.filter_map(|emitter| emitter.peak_within(region.theta_max_rad));
-        peaks.map(|(value, ..)| value).fold(0.0, f64::max)
+        let peaks = self.emitters().iter().filter_map(|emitter| {
+            let (.., part) = emitter.brightest_within(region.x_m, region.y_m)?;
+            let (value, ..) = emitter.law().peak_within(region.theta_max_rad)?;
+            Some(part * emitter.level() * value)
+        });
+        peaks.fold(0.0, f64::max)
     }
 }

@@ -41,7 +41,9 @@ pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use optics::Axis;
 pub use pty::Pty;
 pub use scene::{
-    EXPONENT_MAX, Emitter, Law, Load, Scene, SceneError, Shape, Tabulated, TabulatedError,
+    Batwing, Body, EXPONENT_MAX, Emitter, Image, LOBE_EXPONENT_MIN, Lamp, LampSource, Law, Load,
+    Lobe, Lobes, Outline, Reflection, SHARPNESS_MAX, Scene, SceneError, Shape, Solid, Surface,
+    Tabulated, TabulatedError, Window, WindowOwner,
 };
 pub use serve::serve;
 pub use simulated::{LinkFaults, Simulated};

@@ -74,7 +74,7 @@ fn emission(scene: &Scene) -> Vec<Candidate> {
     }
     let whole = Influence::Mandatory(Some(Bound { value: 1.0, unit: BoundUnit::Relative }));
     let each = emitters.iter().enumerate().map(|(i, emitter)| {
-        let cause = format!("emitter[{i}].kind = \"{}\"", emitter.law().name());
+        let cause = format!("emitter[{i}].kind = \"{}\"", emitter.kind());
         let how = "radiance along a ray, in closed form";
         Candidate::of_key(format!("emission[{i}]"), &cause, true, whole, how)
     });

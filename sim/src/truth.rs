@@ -82,10 +82,11 @@ impl<'c> Truth<'c> {
         let centre = (f64::midpoint(x_m.0, x_m.1), f64::midpoint(y_m.0, y_m.1));
         let dark = Peak { value: 0.0, x_m: centre.0, y_m: centre.1, theta_rad: 0.0, phi_rad: 0.0 };
         self.scene.emitters().iter().try_fold(dark, |peak, emitter| {
-            let Some((x_m, y_m)) = emitter.shape().point_within(x_m, y_m) else {
+            let Some((x_m, y_m, part)) = emitter.brightest_within(x_m, y_m) else {
                 return Some(peak);
             };
-            let (value, theta_rad, phi_rad) = emitter.peak_within(theta_max_rad)?;
+            let (value, theta_rad, phi_rad) = emitter.law().peak_within(theta_max_rad)?;
+            let value = part * emitter.level() * value;
             let higher = Peak { value, x_m, y_m, theta_rad, phi_rad };
             Some(if value > peak.value { higher } else { peak })
         })
@@ -98,7 +99,7 @@ impl<'c> Truth<'c> {
             .emitters()
             .iter()
             .map(|emitter| {
-                emitter.shape().area_within_m2(x_m, y_m) * emitter.exitance_within(theta_max_rad)
+                emitter.area_within_m2(x_m, y_m) * emitter.exitance_within(theta_max_rad)
             })
             .sum();
         flux / self.region.area_m2()

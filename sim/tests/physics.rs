@@ -264,7 +264,7 @@ fn truth_is_what_the_definitions_say() {
     let half = Shape::Rectangle { x_m: (0.0, 0.1), y_m: (-0.1, 0.1) };
     let sin2 = region.theta_max_rad.sin().powi(2);
 
-    let uniform = patch(Emitter::lambertian(half, 12.0));
+    let uniform = patch(Emitter::lambertian(half.clone(), 12.0));
     let truth = uniform.truth(region);
     close(truth.exitance(), PI * 12.0 / 2.0);
     close(truth.exitance_within_region(), PI * 12.0 / 2.0 * sin2);
@@ -273,7 +273,7 @@ fn truth_is_what_the_definitions_say() {
     close(peak.value, 12.0);
     assert!(half.contains(peak.x_m, peak.y_m) && peak.x_m < 0.02);
 
-    let lobe = patch(Emitter::cosine_power(half, 20.0, 12.0));
+    let lobe = patch(Emitter::cosine_power(half.clone(), 20.0, 12.0));
     let truth = lobe.truth(region);
     close(truth.exitance(), PI * 12.0 / 22.0);
     close(

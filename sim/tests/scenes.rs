@@ -39,9 +39,9 @@ fn levels_and_outlines_are_read_in_their_units() {
     )
     .unwrap();
     let [patch, lobe] = scene.emitters() else { panic!("{scene:?}") };
-    assert_eq!(*patch.shape(), Shape::Rectangle { x_m: (-0.01, 0.01), y_m: (0.0, 0.005) });
+    assert_eq!(*patch.shape().unwrap(), Shape::Rectangle { x_m: (-0.01, 0.01), y_m: (0.0, 0.005) });
     assert!((patch.radiance(1.0, 2.0) - 6.0 / PI).abs() < 1e-15);
-    assert_eq!(*lobe.shape(), Shape::disk(0.03, 0.0, 0.004));
+    assert_eq!(*lobe.shape().unwrap(), Shape::disk(0.03, 0.0, 0.004));
     assert!((lobe.radiance(0.5, 0.0) - 2.5 * 0.5_f64.cos().powi(8)).abs() < 1e-14);
     assert_eq!(scene.radiance(0.02, 0.0, 0.0, 0.0).to_bits(), 0, "dark between the two");
 }
@@ -53,7 +53,7 @@ fn a_photometric_file_makes_a_patch_of_its_own_size() {
     let scene = read_for(Quantity::Radiance, text, &file).unwrap();
     let emitter = &scene.emitters()[0];
     // Length along C0-C180, which is x; width across it.
-    assert_eq!(*emitter.shape(), Shape::rectangle(0.0, 0.0, 0.05, 0.02));
+    assert_eq!(*emitter.shape().unwrap(), Shape::rectangle(0.0, 0.0, 0.05, 0.02));
     let radiance = |theta: f64, intensity_w: f64| intensity_w / (0.05 * 0.02 * theta.cos());
     for (theta_deg, milliwatts) in [(0.0, 100.0), (60.0, 100.0), (85.0, 50.0)] {
         let theta = f64::to_radians(theta_deg);
@@ -63,10 +63,10 @@ fn a_photometric_file_makes_a_patch_of_its_own_size() {
     assert_eq!(emitter.radiance(FRAC_PI_2, 0.0).to_bits(), 0, "never divided by cos 90°");
     let stated = format!("{text}radius_mm = 10\n");
     let scene = read_for(Quantity::Radiance, &stated, &file).unwrap();
-    assert_eq!(*scene.emitters()[0].shape(), Shape::disk(0.0, 0.0, 0.01));
+    assert_eq!(*scene.emitters()[0].shape().unwrap(), Shape::disk(0.0, 0.0, 0.01));
     let circle = lamp(MILLIWATTS, "-0.04 -0.04 0");
     let scene = read_for(Quantity::Radiance, text, &circle).unwrap();
-    assert_eq!(*scene.emitters()[0].shape(), Shape::disk(0.0, 0.0, 0.02));
+    assert_eq!(*scene.emitters()[0].shape().unwrap(), Shape::disk(0.0, 0.0, 0.02));
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn the_luminaire_of_the_examples_is_read_whole() {
     let document = Document::parse(Source::new("scene.toml", text)).unwrap();
     let scene = Scene::read(&document, Quantity::Radiance, &|_| Ok(bytes.to_vec())).unwrap();
     let emitter = &scene.emitters()[0];
-    assert_eq!(*emitter.shape(), Shape::rectangle(0.0, 0.0, 0.06, 0.045));
+    assert_eq!(*emitter.shape().unwrap(), Shape::rectangle(0.0, 0.0, 0.06, 0.045));
     // A node of the file, C 22.5° and γ 25°: 89.124... mW/sr. C = -φ.
     let (theta, phi) = (25.0_f64.to_radians(), -22.5_f64.to_radians());
     let expected = 0.089_124_469_565_902_71 / (0.06 * 0.045 * theta.cos());
@@ -210,7 +210,7 @@ fn the_luminaire_of_the_examples_is_read_whole() {
     // The same flux as the reader of the file finds by its own formula.
     let photometry = photometry_files::lm63::read(bytes).unwrap();
     let flux_w = photometry.flux_within(90.0) / 1e3;
-    let found = emitter.exitance_within(FRAC_PI_2) * emitter.shape().area_m2();
+    let found = emitter.exitance_within(FRAC_PI_2) * emitter.shape().unwrap().area_m2();
     assert!((found / flux_w - 1.0).abs() < 1e-13, "{found} W beside {flux_w} W");
     assert!(
         scene.notes().iter().any(|note| note.contains("planes disagree")),

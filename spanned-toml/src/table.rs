@@ -132,6 +132,30 @@ impl<'d> Table<'d> {
             .map(Some)
     }
 
+    /// A list of points, each a list of numbers inside `bounds`: as many as the ranges allow.
+    pub fn points(
+        &self,
+        key: &str,
+        bounds: Bounds,
+        count: RangeInclusive<usize>,
+        dimensions: RangeInclusive<usize>,
+    ) -> Result<Option<Vec<Vec<f64>>>, Problem> {
+        let Some(value) = self.look_up(key) else { return Ok(None) };
+        let each = format!("{} to {} numbers, each {bounds}", dimensions.start(), dimensions.end());
+        let expected = format!("a list of {} to {} lists of {each}", count.start(), count.end());
+        let list = match &value.kind {
+            Kind::Array(list) if count.contains(&list.len()) => list,
+            _ => return Err(self.unexpected(key, value, &expected)),
+        };
+        let point = |item: &Value| match &item.kind {
+            Kind::Array(numbers) if dimensions.contains(&numbers.len()) => {
+                numbers.iter().map(|number| self.read_number(key, number, bounds)).collect()
+            }
+            _ => Err(self.unexpected(key, item, &format!("a list of {each}"))),
+        };
+        list.iter().map(point).collect::<Result<_, _>>().map(Some)
+    }
+
     /// `[low, high]` with `low < high`, both inside `bounds`.
     pub fn interval(&self, key: &str, bounds: Bounds) -> Result<Option<(f64, f64)>, Problem> {
         let Some(pair) = self.numbers(key, bounds, 2..=2)? else { return Ok(None) };
@@ -430,6 +454,17 @@ mod tests {
         let document = document("kind = \"rastr\"");
         let problem = document.root().required_choice("kind", &[("raster", 1), ("list", 2)]);
         assert!(problem.unwrap_err().to_string().contains("did you mean \"raster\"?"));
+    }
+
+    #[test]
+    fn points_are_lists_of_lists_each_refused_where_it_stands() {
+        let document = document("a = [[0, 1], [2.5, 3]]\nb = [[0, 1], [2]]\nc = [[0, \"x\"]]");
+        let root = document.root();
+        let points = |key| root.points(key, Bounds::FINITE, 1..=4, 2..=3);
+        assert_eq!(points("a"), Ok(Some(vec![vec![0.0, 1.0], vec![2.5, 3.0]])));
+        assert_eq!(points("b").unwrap_err().line_and_column(), Some((2, 14)));
+        assert_eq!(points("c").unwrap_err().line_and_column(), Some((3, 10)));
+        assert_eq!(points("d"), Ok(None));
     }
 
     #[test]

@@ -1,121 +1,56 @@
-//! What a scene says: patches on the sample's plane that emit, each with an outline, an angular
-//! law and a level. Built here or read from scene.toml.
+//! What a scene says: what emits, what is lit and by what, what stands in the way of light. Built
+//! here or read from scene.toml.
 //!
-//! A scene does not know the rig, but for the kind of quantity that its levels are in.
+//! Everything stands in the sample's frame, turns and travels with it, and lies at z of 0 or above.
+//! A scene does not know the rig, but for the kind of quantity that its levels are in, and it computes
+//! no light: it only says what is there, and that it can be there.
 
+mod contact;
+mod emitter;
+mod error;
 mod file;
+mod image;
+mod lamp;
 mod law;
-mod photometric;
+mod outline;
 mod shape;
-mod tabulated;
+mod surface;
+mod window;
 
-use core::f64::consts::{FRAC_PI_2, PI};
-use core::fmt;
+use core::f64::consts::PI;
 
-use glam::DVec3;
-
+pub use contact::Solid;
+pub use emitter::{Body, Emitter};
+pub use error::SceneError;
 pub use file::Load;
-pub use law::Law;
+pub use image::Image;
+pub use lamp::{Lamp, LampSource};
+pub use law::{
+    Batwing, LOBE_EXPONENT_MIN, Law, Lobe, Lobes, SHARPNESS_MAX, Tabulated, TabulatedError,
+};
+pub use outline::Outline;
 pub use shape::Shape;
-pub use tabulated::{Tabulated, TabulatedError};
+pub use surface::{Reflection, Surface};
+pub use window::{Window, WindowOwner};
 
 use crate::{Quantity, Region, SourceOverTime};
-
-/// A patch of the sample that emits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Emitter {
-    shape: Shape,
-    law: Law,
-    /// Radiance along the normal; one for a law that brings its own level.
-    level: f64,
-}
-
-impl Emitter {
-    /// The same radiance into every direction.
-    pub const fn lambertian(shape: Shape, radiance: f64) -> Self {
-        Self { shape, law: Law::Lambertian, level: radiance }
-    }
-
-    /// As [`Emitter::lambertian`], its level as exitance: L = M / π.
-    pub const fn lambertian_exitance(shape: Shape, exitance: f64) -> Self {
-        Self::lambertian(shape, exitance / PI)
-    }
-
-    /// L(θ) = L₀ cosⁿ θ, n = 0 being Lambert's law.
-    pub const fn cosine_power(shape: Shape, exponent: f64, radiance: f64) -> Self {
-        Self { shape, law: Law::CosinePower { exponent }, level: radiance }
-    }
-
-    /// As [`Emitter::cosine_power`], its level as exitance: L₀ = M (n + 2) / 2π.
-    pub const fn cosine_power_exitance(shape: Shape, exponent: f64, exitance: f64) -> Self {
-        Self::cosine_power(shape, exponent, exitance * (exponent + 2.0) / (2.0 * PI))
-    }
-
-    /// A patch that emits after a table of intensities: L = I / (A cos θ), with A the area of
-    /// `shape`.
-    pub fn tabulated(shape: Shape, table: Tabulated) -> Self {
-        let level = 1.0 / shape.area_m2();
-        Self { shape, law: Law::Tabulated(table), level }
-    }
-
-    /// Where it is.
-    pub const fn shape(&self) -> &Shape {
-        &self.shape
-    }
-
-    /// How its radiance goes with direction.
-    pub const fn law(&self) -> &Law {
-        &self.law
-    }
-
-    /// Radiance into (θ, φ), radians, in the scene's unit. Zero for θ of 90° and beyond, where a
-    /// flat patch is not seen.
-    pub fn radiance(&self, theta_rad: f64, phi_rad: f64) -> f64 {
-        self.level * self.law.radiance(theta_rad, phi_rad)
-    }
-
-    /// As [`Emitter::radiance`], into a direction of length one.
-    pub fn radiance_into(&self, direction: DVec3) -> f64 {
-        self.level * self.law.radiance_into(direction)
-    }
-
-    /// Exitance into directions up to `theta_max_rad` from the normal.
-    pub fn exitance_within(&self, theta_max_rad: f64) -> f64 {
-        self.level * self.law.exitance_within(theta_max_rad)
-    }
-
-    /// The largest radiance up to `theta_max_rad`, with its direction (θ, φ). `None` where it
-    /// grows beyond any bound, as a table does that ends above zero at 90°.
-    pub fn peak_within(&self, theta_max_rad: f64) -> Option<(f64, f64, f64)> {
-        let (value, theta, phi) = self.law.peak_within(theta_max_rad)?;
-        Some((self.level * value, theta, phi))
-    }
-
-    fn check(&self) -> Result<(), SceneError> {
-        if !self.shape.is_sound() {
-            return Err(SceneError::Shape(self.shape));
-        }
-        if !self.level.is_finite() || self.level < 0.0 {
-            return Err(SceneError::Level(self.level));
-        }
-        match self.law {
-            Law::CosinePower { exponent } if !(0.0..=EXPONENT_MAX).contains(&exponent) => {
-                Err(SceneError::Exponent(exponent))
-            }
-            _ => Ok(()),
-        }
-    }
-}
 
 /// The narrowest cosine lobe: half its peak at half a degree. A narrower one is a collimated
 /// beam, which a scanning detector does not resolve.
 pub const EXPONENT_MAX: f64 = 20_000.0;
 
-/// Patches that emit, on a dark plane.
+/// How far below the sample's plane rounding may take a body that touches it, in parts of its size.
+const SUNK: f64 = 1e-9;
+
+/// What is there, on a dark plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     quantity: Quantity,
     emitters: Vec<Emitter>,
+    surfaces: Vec<Surface>,
+    lamps: Vec<Lamp>,
+    occluders: Vec<Solid>,
+    windows: Vec<Window>,
     over_time: SourceOverTime,
     notes: Vec<String>,
 }
@@ -123,13 +58,21 @@ pub struct Scene {
 impl Scene {
     /// A dark plane; levels to come are in the quantity's unit.
     pub const fn new(quantity: Quantity) -> Self {
-        let over_time = SourceOverTime { warm_up: None, mains_flicker: None };
-        Self { quantity, emitters: Vec::new(), over_time, notes: Vec::new() }
+        Self {
+            quantity,
+            emitters: Vec::new(),
+            surfaces: Vec::new(),
+            lamps: Vec::new(),
+            occluders: Vec::new(),
+            windows: Vec::new(),
+            over_time: SourceOverTime { warm_up: None, mains_flicker: None },
+            notes: Vec::new(),
+        }
     }
 
     /// The scene with light that goes so with time.
     #[must_use]
-    pub fn over_time_as(mut self, over_time: SourceOverTime) -> Self {
+    pub const fn over_time_as(mut self, over_time: SourceOverTime) -> Self {
         self.over_time = over_time;
         self
     }
@@ -140,15 +83,72 @@ impl Scene {
         Ok(self)
     }
 
-    /// Adds an emitter. Emitters do not overlap: which of two would be seen is not defined.
+    /// Adds an emitter. Patches do not overlap: which of two would be seen is not defined.
     pub fn add(&mut self, emitter: Emitter) -> Result<(), SceneError> {
         emitter.check()?;
-        let clash = self.emitters.iter().position(|other| other.shape.overlaps(&emitter.shape));
-        if let Some(other) = clash {
-            return Err(SceneError::Overlap { other });
-        }
+        self.check_body(emitter.body())?;
         self.emitters.push(emitter);
         Ok(())
+    }
+
+    /// Adds a surface that is lit.
+    pub fn add_surface(&mut self, surface: Surface) -> Result<(), SceneError> {
+        surface.check()?;
+        self.check_body(surface.body())?;
+        self.surfaces.push(surface);
+        Ok(())
+    }
+
+    /// Adds a lamp.
+    pub fn add_lamp(&mut self, lamp: Lamp) -> Result<(), SceneError> {
+        lamp.check()?;
+        if let Some(solid) = lamp.solid() {
+            self.check_solid(solid)?;
+        }
+        self.lamps.push(lamp);
+        Ok(())
+    }
+
+    /// Adds a black body that stands in the way.
+    pub fn add_occluder(&mut self, occluder: Solid) -> Result<(), SceneError> {
+        if occluder.extent_m() <= 0.0 && !matches!(occluder, Solid::HalfPlane(_)) {
+            return Err(SceneError::NoArea(0.0));
+        }
+        self.check_solid(&occluder)?;
+        self.occluders.push(occluder);
+        Ok(())
+    }
+
+    /// Adds a window.
+    pub fn add_window(&mut self, window: Window) -> Result<(), SceneError> {
+        window.check()?;
+        let (low, high) = (window.z_m, window.z_m + window.thickness_m);
+        let clash = self.windows.iter().position(|other| {
+            let shared = high.min(other.z_m + other.thickness_m) - low.max(other.z_m);
+            shared > SUNK * window.thickness_m
+        });
+        if let Some(i) = clash {
+            return Err(SceneError::Penetrates { other: format!("window[{i}]") });
+        }
+        for (name, solid) in self.solids() {
+            let (bottom, top) = solid.heights_m();
+            // What lies in the plane of a face touches it.
+            if is_within(bottom, top, &window) {
+                return Err(SceneError::Penetrates { other: name });
+            }
+        }
+        self.windows.push(window);
+        Ok(())
+    }
+
+    /// How the light of all emitters and lamps goes with time.
+    pub const fn over_time(&self) -> &SourceOverTime {
+        &self.over_time
+    }
+
+    /// What all emitters send out, W or lm.
+    pub fn flux(&self) -> f64 {
+        self.emitters.iter().map(Emitter::flux).sum()
     }
 
     /// What the levels are.
@@ -156,21 +156,29 @@ impl Scene {
         self.quantity
     }
 
-    /// The patches, in the order of the file.
+    /// What emits, in the order of the file.
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
     }
 
-    /// How all light goes with time.
-    pub const fn over_time(&self) -> &SourceOverTime {
-        &self.over_time
+    /// What is lit, in the order of the file.
+    pub fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
-    /// What all emitters send into the whole hemisphere, W or lm.
-    pub fn flux(&self) -> f64 {
-        let of_emitter =
-            |emitter: &Emitter| emitter.shape.area_m2() * emitter.exitance_within(FRAC_PI_2);
-        self.emitters.iter().map(of_emitter).sum()
+    /// What lights, in the order of the file.
+    pub fn lamps(&self) -> &[Lamp] {
+        &self.lamps
+    }
+
+    /// What is black and stands in the way, in the order of the file.
+    pub fn occluders(&self) -> &[Solid] {
+        &self.occluders
+    }
+
+    /// In the order of the file.
+    pub fn windows(&self) -> &[Window] {
+        &self.windows
     }
 
     /// What a person should know about the files that the scene refers to: irregularities that
@@ -179,65 +187,91 @@ impl Scene {
         &self.notes
     }
 
-    /// The bounding rectangle of all patches, with directions up to 80°. Of a dark scene, the
-    /// square centimetre around the origin.
+    /// The bounding rectangle of all that lies on the plane, with directions up to 80°. Of a scene
+    /// without any, the square centimetre around the origin.
     pub(crate) fn bounding_region(&self) -> Region {
         let around = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-        let boxes = self.emitters.iter().map(|emitter| emitter.shape.bounding_box());
+        let bodies = self.emitters.iter().map(Emitter::body);
+        let bodies = bodies.chain(self.surfaces.iter().map(Surface::body));
+        let boxes = bodies.filter_map(Body::shape).map(Shape::bounding_box);
         let all = boxes.reduce(|a, b| (around(a.0, b.0), around(a.1, b.1)));
         let (x_m, y_m) = all.unwrap_or(((-0.005, 0.005), (-0.005, 0.005)));
         Region { x_m, y_m, theta_max_rad: 80.0 / 180.0 * PI }
     }
 
-    /// Radiance from (x, y), metres, into (θ, φ), radians. Zero off every patch. On an outline
-    /// that two patches share, the first is seen.
+    /// Radiance from (x, y), metres, into (θ, φ), radians, of the emitters on the plane alone. Zero
+    /// off every patch. On an outline that two patches share, the first is seen.
     pub fn radiance(&self, x_m: f64, y_m: f64, theta_rad: f64, phi_rad: f64) -> f64 {
-        self.emitters
-            .iter()
-            .find(|emitter| emitter.shape.contains(x_m, y_m))
-            .map_or(0.0, |emitter| emitter.radiance(theta_rad, phi_rad))
+        let on = |emitter: &&Emitter| emitter.shape().is_some_and(|shape| shape.contains(x_m, y_m));
+        let emitter = self.emitters.iter().find(on);
+        emitter.map_or(0.0, |emitter| emitter.radiance_at(x_m, y_m, theta_rad, phi_rad))
     }
-}
 
-/// Why an emitter can't be part of a scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SceneError {
-    /// The exponent of a cosine lobe.
-    Exponent(f64),
-    /// A level that is negative or not a number.
-    Level(f64),
-    /// It shares area with the emitter of this index.
-    Overlap {
-        /// From 0, in the order in which they were added.
-        other: usize,
-    },
-    /// An outline without an inside.
-    Shape(Shape),
-}
+    /// What of the scene is more than light from patches on the sample's plane.
+    pub(crate) fn beyond_flat_emitters(&self) -> Option<String> {
+        let raised = self.emitters.iter().position(|emitter| emitter.shape().is_none());
+        let lists = [
+            ("surface", self.surfaces.len()),
+            ("occluder", self.occluders.len()),
+            ("window", self.windows.len()),
+        ];
+        let list = lists.iter().find(|(_, count)| *count > 0);
+        raised
+            .map(|i| format!("emitter[{i}] stands above the sample's plane"))
+            .or_else(|| list.map(|(what, _)| format!("{what}[0]")))
+    }
 
-impl SceneError {
-    /// What to write instead.
-    pub(crate) const fn expected(&self) -> &'static str {
-        match self {
-            Self::Exponent(_) => "an exponent of at least 0 and at most 20000",
-            Self::Level(_) => "a finite level of at least 0",
-            Self::Overlap { .. } => "emitters that do not overlap (they may touch)",
-            Self::Shape(_) => "an outline of finite size above 0",
+    /// Everything opaque, with the name that scene.toml's order gives it.
+    fn solids(&self) -> Vec<(String, Solid)> {
+        let mut solids = Vec::new();
+        let mut add = |what: &str, i: usize, solid: Option<Solid>| {
+            solids.extend(solid.map(|solid| (format!("{what}[{i}]"), solid)));
+        };
+        for (i, emitter) in self.emitters.iter().enumerate() {
+            add("emitter", i, emitter.body().solid());
         }
+        for (i, surface) in self.surfaces.iter().enumerate() {
+            add("surface", i, surface.body().solid());
+        }
+        for (i, lamp) in self.lamps.iter().enumerate() {
+            add("lamp", i, lamp.solid().cloned());
+        }
+        for (i, occluder) in self.occluders.iter().enumerate() {
+            add("occluder", i, Some(occluder.clone()));
+        }
+        solids
     }
-}
 
-impl fmt::Display for SceneError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Exponent(exponent) => {
-                write!(f, "exponent {exponent} is not from 0 to {EXPONENT_MAX}")
+    fn check_body(&self, body: &Body) -> Result<(), SceneError> {
+        if let Body::Flat(shape) = body {
+            let emitters = self.emitters.iter().map(Emitter::body).enumerate();
+            let surfaces = self.surfaces.iter().map(Surface::body).enumerate();
+            let named = emitters.map(|(i, body)| (format!("emitter[{i}]"), body));
+            let named = named.chain(surfaces.map(|(i, body)| (format!("surface[{i}]"), body)));
+            for (other, body) in named {
+                if body.shape().is_some_and(|other| other.overlaps(shape)) {
+                    return Err(SceneError::Overlap { other });
+                }
             }
-            Self::Level(level) => write!(f, "level {level} is not a finite number of at least 0"),
-            Self::Overlap { other } => write!(f, "the emitter overlaps emitter[{other}]"),
-            Self::Shape(shape) => write!(f, "the outline has no inside: {shape:?}"),
         }
+        body.solid().map_or(Ok(()), |solid| self.check_solid(&solid))
+    }
+
+    fn check_solid(&self, solid: &Solid) -> Result<(), SceneError> {
+        let (bottom, top) = solid.heights_m();
+        if bottom < -SUNK * solid.extent_m() {
+            return Err(SceneError::Below(bottom));
+        }
+        if let Some(i) = self.windows.iter().position(|window| is_within(bottom, top, window)) {
+            return Err(SceneError::Penetrates { other: format!("window[{i}]") });
+        }
+        let clash = self.solids().into_iter().find(|(_, other)| other.penetrates(solid));
+        clash.map_or(Ok(()), |(other, _)| Err(SceneError::Penetrates { other }))
     }
 }
 
-impl core::error::Error for SceneError {}
+/// Whether what reaches from `bottom` to `top` has a part inside a window.
+fn is_within(bottom: f64, top: f64, window: &Window) -> bool {
+    let margin = SUNK * window.thickness_m;
+    top > window.z_m + margin && bottom < window.z_m + window.thickness_m - margin
+}

@@ -1,8 +1,10 @@
 //! Outlines on the sample's plane: what they hold, whether they overlap, and the exact area that
 //! they share with a rectangle.
 
+use super::outline::{Outline, Point, edges};
+
 /// An outline in the sample's plane z = 0, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A circle's inside.
     Disk {
@@ -13,6 +15,8 @@ pub enum Shape {
         /// Above zero.
         radius_m: f64,
     },
+    /// Any simple polygon.
+    Polygon(Outline),
     /// An upright rectangle; low before high.
     Rectangle {
         /// From low to high.
@@ -36,9 +40,13 @@ impl Shape {
 
     /// Whether it is finite and has an inside.
     pub(crate) fn is_sound(&self) -> bool {
-        match *self {
+        match self {
             Self::Disk { x_m, y_m, radius_m } => {
-                x_m.is_finite() && y_m.is_finite() && radius_m.is_finite() && radius_m > 0.0
+                x_m.is_finite() && y_m.is_finite() && radius_m.is_finite() && *radius_m > 0.0
+            }
+            Self::Polygon(outline) => {
+                let area_m2 = outline.area_m2();
+                area_m2.is_finite() && area_m2 > 0.0
             }
             Self::Rectangle { x_m, y_m } => [x_m, y_m]
                 .iter()
@@ -48,36 +56,47 @@ impl Shape {
 
     /// Whether the point lies inside or on the outline.
     pub fn contains(&self, x: f64, y: f64) -> bool {
-        match *self {
-            Self::Disk { x_m, y_m, radius_m } => libm::hypot(x - x_m, y - y_m) <= radius_m,
+        match self {
+            Self::Disk { x_m, y_m, radius_m } => libm::hypot(x - x_m, y - y_m) <= *radius_m,
+            Self::Polygon(outline) => outline.contains(x, y),
             Self::Rectangle { x_m, y_m } => {
                 (x_m.0..=x_m.1).contains(&x) && (y_m.0..=y_m.1).contains(&y)
             }
         }
     }
 
-    /// From low to high along x and along y, metres.
-    pub(crate) fn bounding_box(&self) -> ((f64, f64), (f64, f64)) {
-        match *self {
-            Self::Disk { x_m, y_m, radius_m } => {
-                ((x_m - radius_m, x_m + radius_m), (y_m - radius_m, y_m + radius_m))
-            }
-            Self::Rectangle { x_m, y_m } => (x_m, y_m),
+    /// Square metres.
+    pub fn area_m2(&self) -> f64 {
+        match self {
+            Self::Disk { radius_m, .. } => core::f64::consts::PI * radius_m * radius_m,
+            Self::Polygon(outline) => outline.area_m2(),
+            Self::Rectangle { x_m, y_m } => (x_m.1 - x_m.0) * (y_m.1 - y_m.0),
         }
     }
 
-    /// Square metres.
-    pub fn area_m2(&self) -> f64 {
-        match *self {
-            Self::Disk { radius_m, .. } => core::f64::consts::PI * radius_m * radius_m,
-            Self::Rectangle { x_m, y_m } => (x_m.1 - x_m.0) * (y_m.1 - y_m.0),
+    /// The upright rectangle around it: x and y, each from low to high.
+    pub fn bounding_box(&self) -> ((f64, f64), (f64, f64)) {
+        match self {
+            Self::Disk { x_m, y_m, radius_m } => {
+                ((x_m - radius_m, x_m + radius_m), (y_m - radius_m, y_m + radius_m))
+            }
+            Self::Polygon(outline) => {
+                let over = |pick: fn(&Point) -> f64| {
+                    let values = outline.corners_m().iter().map(pick);
+                    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                        (low.min(value), high.max(value))
+                    })
+                };
+                (over(|p| p.0), over(|p| p.1))
+            }
+            Self::Rectangle { x_m, y_m } => (*x_m, *y_m),
         }
     }
 
     /// Whether two shapes share more than outline. Touching is not overlapping, and neither is
     /// what rounding makes of touching: a billionth of the sizes at hand.
     pub fn overlaps(&self, other: &Self) -> bool {
-        match (*self, *other) {
+        match (self, other) {
             (
                 Self::Disk { x_m, y_m, radius_m },
                 Self::Disk { x_m: x2, y_m: y2, radius_m: radius2 },
@@ -85,53 +104,90 @@ impl Shape {
                 let reach = radius_m + radius2;
                 libm::hypot(x_m - x2, y_m - y2) < reach * (1.0 - TOUCH)
             }
-            (Self::Rectangle { x_m, y_m }, Self::Rectangle { x_m: x2, y_m: y2 }) => {
-                share(x_m, x2) && share(y_m, y2)
+            (Self::Disk { x_m, y_m, radius_m }, flat)
+            | (flat, Self::Disk { x_m, y_m, radius_m }) => {
+                let reach = radius_m * (1.0 - TOUCH);
+                flat.contains(*x_m, *y_m)
+                    || flat.parts().iter().any(|part| distance(part, (*x_m, *y_m)) < reach)
             }
-            (rectangle @ Self::Rectangle { .. }, disk @ Self::Disk { .. }) => {
-                disk.overlaps(&rectangle)
-            }
-            (Self::Disk { x_m, y_m, radius_m }, Self::Rectangle { x_m: xs, y_m: ys }) => {
-                let (dx, dy) = (x_m - x_m.clamp(xs.0, xs.1), y_m - y_m.clamp(ys.0, ys.1));
-                libm::hypot(dx, dy) < radius_m * (1.0 - TOUCH)
+            (a, b) => {
+                let others = b.parts();
+                a.parts().iter().any(|part| others.iter().any(|other| share(part, other)))
             }
         }
     }
 
-    /// The area that it shares with a rectangle, square metres. Exact for both shapes.
+    /// Convex polygons that make it up; none for a disk.
+    fn parts(&self) -> Vec<Vec<Point>> {
+        match self {
+            Self::Disk { .. } => Vec::new(),
+            Self::Polygon(outline) => {
+                outline.triangles().iter().map(|triangle| triangle.to_vec()).collect()
+            }
+            Self::Rectangle { x_m: xs, y_m: ys } => {
+                vec![vec![(xs.0, ys.0), (xs.1, ys.0), (xs.1, ys.1), (xs.0, ys.1)]]
+            }
+        }
+    }
+
+    /// The area that it shares with a rectangle, square metres. Exact for every shape.
     pub fn area_within_m2(&self, xs: (f64, f64), ys: (f64, f64)) -> f64 {
-        match *self {
+        match self {
             Self::Disk { x_m, y_m, radius_m } => {
-                disk_within(radius_m, (xs.0 - x_m, xs.1 - x_m), (ys.0 - y_m, ys.1 - y_m))
+                disk_within(*radius_m, (xs.0 - x_m, xs.1 - x_m), (ys.0 - y_m, ys.1 - y_m))
             }
+            Self::Polygon(outline) => outline.area_within_m2(xs, ys),
             Self::Rectangle { x_m, y_m } => {
-                let shared = |a: (f64, f64), b: (f64, f64)| (a.1.min(b.1) - a.0.max(b.0)).max(0.0);
-                shared(x_m, xs) * shared(y_m, ys)
+                let shared = |a: Point, b: Point| (a.1.min(b.1) - a.0.max(b.0)).max(0.0);
+                shared(*x_m, xs) * shared(*y_m, ys)
             }
         }
     }
 
-    /// A point that it shares with a rectangle: the middle of what two rectangles share, or what
-    /// is nearest to a disk's centre.
+    /// A point that it shares with a rectangle: the middle of what two rectangles share, what is
+    /// nearest to a disk's centre, the middle of a large part of a polygon.
     pub(crate) fn point_within(&self, xs: (f64, f64), ys: (f64, f64)) -> Option<(f64, f64)> {
-        let point = match *self {
+        let point = match self {
             Self::Disk { x_m, y_m, .. } => (x_m.clamp(xs.0, xs.1), y_m.clamp(ys.0, ys.1)),
+            Self::Polygon(outline) => outline.point_within(xs, ys)?,
             Self::Rectangle { x_m, y_m } => {
-                let middle =
-                    |a: (f64, f64), b: (f64, f64)| f64::midpoint(a.0.max(b.0), a.1.min(b.1));
-                (middle(x_m, xs), middle(y_m, ys))
+                let middle = |a: Point, b: Point| f64::midpoint(a.0.max(b.0), a.1.min(b.1));
+                (middle(*x_m, xs), middle(*y_m, ys))
             }
         };
         (self.area_within_m2(xs, ys) > 0.0 && self.contains(point.0, point.1)).then_some(point)
     }
 }
 
-/// Intervals that share less than this part of the shorter one only touch.
+/// Shapes that share less than this part of the smaller one, across, only touch.
 const TOUCH: f64 = 1e-9;
 
-fn share(a: (f64, f64), b: (f64, f64)) -> bool {
-    let shorter = (a.1 - a.0).min(b.1 - b.0);
-    a.1.min(b.1) - a.0.max(b.0) > TOUCH * shorter
+/// Whether two convex polygons share more than outline: they do unless an edge of one has the other
+/// on its far side (Gottschalk, Lin and Manocha 1996, in two dimensions).
+fn share(a: &[Point], b: &[Point]) -> bool {
+    edges(a).chain(edges(b)).all(|(p, q)| {
+        let across = (p.1 - q.1, q.0 - p.0);
+        let over = |corners: &[Point]| {
+            let along = corners.iter().map(|c| (c.0 - p.0) * across.0 + (c.1 - p.1) * across.1);
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            })
+        };
+        let (a, b) = (over(a), over(b));
+        let shorter = (a.1 - a.0).min(b.1 - b.0);
+        a.1.min(b.1) - a.0.max(b.0) > TOUCH * shorter
+    })
+}
+
+/// From a point to the edges of a polygon.
+fn distance(corners: &[Point], to: Point) -> f64 {
+    let from_edge = |(a, b): (Point, Point)| {
+        let (edge, apart) = ((b.0 - a.0, b.1 - a.1), (to.0 - a.0, to.1 - a.1));
+        let square = edge.0 * edge.0 + edge.1 * edge.1;
+        let part = ((edge.0 * apart.0 + edge.1 * apart.1) / square).clamp(0.0, 1.0);
+        libm::hypot(apart.0 - part * edge.0, apart.1 - part * edge.1)
+    };
+    edges(corners).map(from_edge).fold(f64::INFINITY, f64::min)
 }
 
 /// The area that a disk around the origin shares with a rectangle: the integral over x of the
@@ -226,5 +282,18 @@ mod tests {
         assert!(!disk.overlaps(&next) && disk.overlaps(&Shape::disk(1.7, 0.5, 0.4)));
         assert!(Shape::disk(0.7, 0.5, 0.2).overlaps(&next));
         assert!(!Shape::disk(0.7, 1.1, 0.12).overlaps(&next), "near a corner, outside it");
+        let polygon =
+            |corners: &[(f64, f64)]| Shape::Polygon(Outline::new(corners.into()).unwrap());
+        let l = polygon(&[(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)]);
+        let notch = Shape::Rectangle { x_m: (1.0, 2.0), y_m: (1.0, 2.0) };
+        assert!(!l.overlaps(&notch) && !notch.overlaps(&l), "it fills the L's corner");
+        assert!(l.overlaps(&right));
+        assert!(!l.overlaps(&left), "they share an edge");
+        assert!(
+            !l.overlaps(&Shape::disk(1.5, 1.5, 0.5)) && l.overlaps(&Shape::disk(1.5, 1.5, 0.6))
+        );
+        assert!(l.overlaps(&Shape::disk(0.5, 0.5, 0.01)), "a disk within it");
+        assert!(l.overlaps(&polygon(&[(0.9, 0.9), (1.5, 1.2), (1.2, 1.5)])), "across the corner");
+        assert!(!l.overlaps(&polygon(&[(1.0, 1.0), (1.5, 1.2), (1.2, 1.5)])), "at the corner");
     }
 }

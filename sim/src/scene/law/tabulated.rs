@@ -131,6 +131,49 @@ impl Tabulated {
         Some(peak)
     }
 
+    /// A bound of |d(I / cos γ)/d angle| up to `theta_max_rad`, from each cell's differences; `None` at
+    /// 90°, and where the planes disagree at the pole, which is a jump.
+    pub(super) fn slope_bound(&self, theta_max_rad: f64) -> Option<f64> {
+        let planes = self.c_rad.len() - 1;
+        let has_pole = self.gamma_rad[0] == 0.0;
+        let is_round = (1..planes).all(|plane| (self.at(plane, 0) - self.at(0, 0)).abs() <= 0.0);
+        let starts_dark = (0..planes).all(|plane| self.at(plane, 0) == 0.0);
+        let ends_dark = (0..planes).all(|plane| self.at(plane, self.gamma_rad.len() - 1) == 0.0);
+        let last = self.gamma_rad[self.gamma_rad.len() - 1];
+        let jumps = (has_pole && !is_round)
+            || (!has_pole && !starts_dark)
+            || (last < theta_max_rad && !ends_dark);
+        let reached = self.gamma_rad.partition_point(|gamma| *gamma < theta_max_rad);
+        if jumps || theta_max_rad >= FRAC_PI_2 {
+            return None;
+        }
+        let mut bound: f64 = 0.0;
+        for i in 1..=reached.min(self.gamma_rad.len() - 1) {
+            let (from, to) = (self.gamma_rad[i - 1], self.gamma_rad[i].min(theta_max_rad));
+            let (cos, tan) = (libm::cos(to), libm::tan(to));
+            for plane in 0..planes {
+                let corner = |plane, gamma| self.at(plane, gamma);
+                let corners = [corner(plane, i - 1), corner(plane + 1, i - 1)];
+                let further = [corner(plane, i), corner(plane + 1, i)];
+                let height = self.gamma_rad[i] - from;
+                let along = (further[0] - corners[0]).abs().max((further[1] - corners[1]).abs());
+                let most = corners.into_iter().chain(further).fold(0.0, f64::max);
+                let width = self.c_rad[plane + 1] - self.c_rad[plane];
+                // ∂I/∂C is linear in γ; over sin γ it is largest at an end, or next to the pole.
+                let near = (corners[1] - corners[0]).abs();
+                let far = (further[1] - further[0]).abs();
+                let around = if from == 0.0 {
+                    far / (width * height) * (to / libm::sin(to))
+                } else {
+                    near.max(far) / (width * libm::sin(from))
+                };
+                let meridian = along / height + most * tan;
+                bound = bound.max(libm::hypot(meridian, around) / cos);
+            }
+        }
+        Some(bound)
+    }
+
     fn at(&self, plane: usize, gamma: usize) -> f64 {
         self.intensity[plane * self.gamma_rad.len() + gamma]
     }

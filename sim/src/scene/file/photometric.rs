@@ -4,8 +4,8 @@
 use photometry_files::lm63::{self, IntensityUnit, Opening, Outline, Photometry};
 use spanned_toml::{Problem, Table};
 
-use super::file::{Load, read_shape};
-use super::{Emitter, Shape, Tabulated};
+use super::super::{Emitter, Shape, Tabulated};
+use super::{Load, outline};
 use crate::Quantity;
 
 /// Two extents of an ellipse that differ by less than this part are a circle's.
@@ -40,7 +40,7 @@ pub(super) fn read(
                     unit, or another rig";
         at_file(&what, expected, help)
     })?;
-    let shape = match read_shape(table)? {
+    let shape = match outline::shape(table)? {
         Some(shape) => shape,
         None => flat(&photometry.opening()).map_err(|opening| {
             let what = format!("its luminous opening is {opening}");
