@@ -5,6 +5,8 @@
 //! and Cess, *Radiation Heat Transfer* (1978), ch. 3; the matrix is completed by the laws that it must
 //! obey (Clark and Korybalski 1974), so that errors of the single factors break neither.
 
+mod bound;
+
 use core::f64::consts::PI;
 use core::fmt;
 

@@ -136,6 +136,22 @@ impl Sun {
         self.irradiance
     }
 
+    /// On a surface whose normal makes an angle in [0, π] with the direction to the centre of the Sun: less
+    /// by the cosine while all of it is up, by the part that is up while it sets, 0 after.
+    ///
+    /// ```
+    /// use radiometry::irradiance::Sun;
+    /// let sun = Sun::lecture();
+    /// let slanting = sun.irradiance_at(std::f64::consts::FRAC_PI_3)?;
+    /// assert!((slanting / sun.irradiance() - 0.5).abs() < 1e-14);
+    /// assert!(sun.irradiance_at(1.57)?.w_per_m2() > 0.0 && sun.irradiance_at(1.58)?.w_per_m2() == 0.0);
+    /// # Ok::<(), radiometry::DomainError>(())
+    /// ```
+    pub fn irradiance_at(&self, normal_angle_rad: f64) -> Result<Irradiance, DomainError> {
+        let sin = libm::sin(self.half_angle_rad);
+        Ok(self.radiance() * projected::sphere_tilted(sin, 1.0, normal_angle_rad)?)
+    }
+
     /// Half of what it subtends.
     pub fn half_angle_rad(&self) -> f64 {
         self.half_angle_rad

@@ -1,10 +1,11 @@
-//! Throughput of a pair of surfaces: so far two coaxial disks, the beam of a spot detector (entrance
-//! pupil and field stop, or pupil and spot). It does not know what light goes through.
+//! Throughput of a pair of surfaces: two small ones, and two coaxial disks, the beam of a spot detector
+//! (entrance pupil and field stop, or pupil and spot); of two polygons it is the form factors' room
+//! that knows. It does not know what light goes through.
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 
-use crate::domain::{DomainError, not_negative, positive};
-use crate::quantity::{FormFactor, Throughput};
+use crate::domain::{DomainError, not_negative, positive, within};
+use crate::quantity::{Area, FormFactor, Throughput};
 
 /// Two parallel disks with one axis, apart. A disk may have no radius: nothing passes, and seen from
 /// that point the form factor is the other's.
@@ -47,6 +48,37 @@ pub fn coaxial_disks(
     distance_m: f64,
 ) -> Result<Throughput, DomainError> {
     CoaxialDisks::new(radius_1_m, radius_2_m, distance_m)?.throughput()
+}
+
+/// Throughput of an infinitesimal beam, m²·sr: dT = dA cos θ dA' cos θ'/r², between two surfaces that
+/// are small beside their distance, each by its area and the angle in [0, π/2] between its normal and
+/// the beam. The lecture's definition of throughput; the rig's detector from far.
+///
+/// ```
+/// use radiometry::quantity::Area;
+/// use radiometry::throughput::infinitesimal_beam;
+/// let (pupil, spot) = (Area::from_m2(2e-6), Area::from_m2(3e-6));
+/// let throughput = infinitesimal_beam((pupil, 0.0), (spot, std::f64::consts::FRAC_PI_3), 0.5)?;
+/// assert!((throughput.m2_sr() / 1.2e-11 - 1.0).abs() < 1e-15);
+/// # Ok::<(), radiometry::DomainError>(())
+/// ```
+pub fn infinitesimal_beam(
+    (area_1, theta_1_rad): (Area, f64),
+    (area_2, theta_2_rad): (Area, f64),
+    distance_m: f64,
+) -> Result<Throughput, DomainError> {
+    let projected = |area: Area, theta: f64| {
+        let area = not_negative("area_m2", area.m2())?;
+        Ok(area * libm::cos(within("theta_rad", theta, 0.0, FRAC_PI_2)?))
+    };
+    let distance = positive("distance_m", distance_m)?;
+    let (from, to) = (projected(area_1, theta_1_rad)?, projected(area_2, theta_2_rad)?);
+    let throughput = (from / distance) * (to / distance);
+    if throughput.is_finite() {
+        Ok(Throughput::from_m2_sr(throughput))
+    } else {
+        Err(DomainError::Overflow { result: "throughput_m2_sr" })
+    }
 }
 
 impl CoaxialDisks {
