@@ -2,6 +2,7 @@
 //! list, and on what has no meaning: the very function that answers a line.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 
 use gonio::cli::calc::{answer_line, answer_words, examples};
 use serde_json::{Value, json};
@@ -211,4 +212,106 @@ fn the_largest_and_smallest_doubles_give_a_number_or_a_sentence() {
             }
         }
     }
+}
+
+#[test]
+fn light_has_the_values_of_the_closed_forms() {
+    let near = |quantity: &str, inputs: Value, expected: &[f64]| {
+        let answer = ask(quantity, &inputs);
+        let bound = answer["error_bound"].as_f64().unwrap_or_else(|| panic!("{answer}"));
+        let found: Vec<f64> = match &answer["value"] {
+            Value::Array(values) => values.iter().filter_map(Value::as_f64).collect(),
+            value => value.as_f64().into_iter().collect(),
+        };
+        assert_eq!(found.len(), expected.len(), "{answer}");
+        for (found, expected) in found.iter().zip(expected) {
+            let error = (found - expected).abs();
+            let said = format!("{quantity}: {answer}, expected {expected:e}");
+            // What is written here is rounded too.
+            assert!(error <= bound + 4e-16 * expected.abs(), "{said}");
+            assert!(bound <= 1e-7 * expected.abs() + 1e-12, "{said}");
+        }
+    };
+    let up = |more: Value| {
+        let mut inputs = json!({"point": [0, 0, 0], "normal": [0, 0, 1], "radiance": 100});
+        for (key, value) in more.as_object().expect("an object") {
+            inputs[key] = value.clone();
+        }
+        inputs
+    };
+    // π L sin² of the half angle: 1/2, and (1/2)² for the sphere.
+    let disk = json!({"center": [0, 0, 1], "axis": [0, 0, 1], "radius": 1});
+    near("irradiance-from-disk", up(disk), &[50.0 * PI]);
+    let sphere = json!({"center": [0, 0, 2], "radius": 1});
+    near("irradiance-from-sphere", up(sphere), &[25.0 * PI]);
+    // One corner of a cube around the receiver: by symmetry of the upper half.
+    let quadrant = json!({"vertices": [[0, 0, 1], [1e20, 0, 1], [0, 1e20, 1]]});
+    near("irradiance-from-polygon", up(quadrant), &[25.0 * PI]);
+    let half = json!({
+        "source": {"kind": "sphere", "center": [0, 0, 2], "radius": 1},
+        "occluder": {"kind": "half-plane", "x_max": 0, "z": 0.5},
+    });
+    near("irradiance-from-occluded-source", up(half), &[12.5 * PI]);
+    let sky = json!([[100.0, 100.0], [0.0, 0.0]]);
+    let environment = |normal: [f64; 3]| json!({"normal": normal, "map": sky});
+    near("irradiance-from-environment", environment([0.0, 0.0, 3.0]), &[100.0 * PI]);
+    near("irradiance-from-environment", environment([1.0, 2.0, 0.0]), &[50.0 * PI]);
+    // The view factor of the sky: (1 + cos θ)/2.
+    near("irradiance-from-environment", environment([3.0, 0.0, 4.0]), &[90.0 * PI]);
+    near("environment-radiance", json!({"direction": [0, 1, -0.1], "map": sky}), &[0.0]);
+    near("irradiance-from-sun", json!({"normal_angle": 0}), &[1353.0]);
+    near("irradiance-from-sun", json!({"normal_angle": PI / 3.0}), &[676.5]);
+    near("irradiance-from-sun", json!({"normal_angle": 2}), &[0.0]);
+    let earth = json!({"distance": 149_597_870_700_f64});
+    near("sun-radiance", earth, &[2.003_402_381_394_15e7]);
+    near("sun-half-angle", json!({}), &[(PI / 180.0) / 4.0]);
+    near("radiance-from-exitance", json!({"exitance": 100.0 * PI}), &[100.0]);
+    near("exitance", json!({"radiance": 100}), &[100.0 * PI]);
+    let beam = |theta2: f64| json!({"area1": 2e-6, "theta1": 0, "area2": 3e-6, "theta2": theta2, "distance": 0.5});
+    near("throughput-infinitesimal-beam", beam(PI / 3.0), &[1.2e-11]);
+    near("luminance", json!({"radiance": 2, "efficacy": 683}), &[1366.0]);
+    near(
+        "radiant-flux-from-luminous-flux",
+        json!({"luminous_flux": 1366, "efficacy": 683}),
+        &[2.0],
+    );
+    // Two wide plates: M₁ = (M₀ + ρ₁ρ₂...)/(1 - ρ₁ρ₂).
+    let plates = json!({
+        "areas": [1, 1], "form_factors": [[0, 1], [1, 0]],
+        "emitted": [100, 0], "reflectance": [0.5, 0.8],
+    });
+    near("radiosity-exitances", plates.clone(), &[100.0 / 0.6, 80.0 / 0.6]);
+    near("radiosity-irradiances", plates, &[80.0 / 0.6, 100.0 / 0.6]);
+}
+
+#[test]
+fn light_without_meaning_is_refused() {
+    let refused = |quantity: &str, inputs: Value, word: &str| {
+        let answer = ask(quantity, &inputs);
+        let error = answer["error"].as_str().unwrap_or_else(|| panic!("{quantity}: {answer}"));
+        assert!(error.contains(word), "{quantity}: {error}");
+    };
+    let map = |map: Value| json!({"normal": [0, 0, 1], "map": map});
+    refused("irradiance-from-environment", map(json!([[1, 2], [3, -4]])), "pixel 3");
+    refused("irradiance-from-environment", map(json!([[1, 2], [3]])), "row 1");
+    refused("irradiance-from-environment", map(json!([])), "0 rows");
+    refused("irradiance-from-environment", map(json!([[], []])), "0 columns");
+    refused("irradiance-from-sun", json!({"normal_angle": 4}), "normal_angle");
+    refused("irradiance-from-sun", json!({"normal_angle": 0, "distance": 1}), "sphere");
+    refused("sun-radiance", json!({"distance": -1}), "distance");
+    refused("luminance", json!({"radiance": 2, "efficacy": 700}), "683.002");
+    refused("luminance", json!({"radiance": -2, "efficacy": 600}), "radiance");
+    refused("radiance-from-luminance", json!({"luminance": 2, "efficacy": 0}), "efficacy");
+    refused("radiant-flux", json!({"radiance": 2, "throughput": -1}), "throughput");
+    let plates = |factors: Value, reflectance: Value| json!({"areas": [1, 1], "form_factors": factors, "emitted": [1, 0], "reflectance": reflectance});
+    let closed = json!([[0, 1], [1, 0]]);
+    refused("radiosity-exitances", plates(json!([[0, 0.9], [0.9, 0]]), json!([0.5, 0.5])), "sum");
+    refused("radiosity-exitances", plates(json!([[0, 1], [0.5, 0.5]]), json!([0.5, 0.5])), "back");
+    refused("radiosity-exitances", plates(json!([[0, 1]]), json!([0.5, 0.5])), "matrix");
+    refused("radiosity-exitances", plates(closed.clone(), json!([1.5, 0.5])), "reflectance");
+    refused("radiosity-exitances", plates(closed.clone(), json!([0.5])), "reflectance");
+    refused("radiosity-exitances", plates(closed, json!([1, 1])), "radiosity");
+    let two = json!([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0, 1, 1], [1, 0, 1]]]);
+    let open = json!({"surfaces": two, "emitted": [1, 0], "reflectance": [0, 0]});
+    refused("radiosity-exitances", open, "do not close");
 }

@@ -120,6 +120,14 @@ impl<'a> Inputs<'a> {
         self.list(name)?.iter().map(column).collect()
     }
 
+    /// A list of polygons, each a list of vectors.
+    pub(super) fn polygons(self, name: &str) -> Result<Vec<Vec<DVec3>>, Refusal> {
+        let polygon = |value: &Value| {
+            as_list((name, value))?.iter().map(|value| as_vector((name, value))).collect()
+        };
+        self.list(name)?.iter().map(polygon).collect()
+    }
+
     /// Named values within a value.
     pub(super) fn object(self, name: &str) -> Result<Inputs<'a>, Refusal> {
         let (name, value) = self.value(name)?;

@@ -1,14 +1,16 @@
-//! Light itself: throughput, the density of throughput in each chart, irradiance and exitance.
+//! Light on rays: throughput, its density in each chart, and the quantities that radiance makes with it.
 
 use std::f64::consts::PI;
 
 use radiometry::chart::{Environment, Perpendicular, Surface, TwoPlane};
 use radiometry::convex::{self, ConvexBody};
-use radiometry::quantity::{ProjectedSolidAngle, Radiance};
+use radiometry::form_factor;
+use radiometry::quantity::{Area, Exitance, ProjectedSolidAngle, Radiance, Throughput};
+use radiometry::shape::Polygon;
 use radiometry::throughput;
 
 use super::inputs::Inputs;
-use super::quantity::{Input, Quantity, Refusal, Rounding};
+use super::quantity::{Input, Quantity, Refusal, Rounding, not_negative, tolerance};
 
 const ROUNDING: Rounding = Rounding::Relative(4e-15);
 
@@ -29,6 +31,60 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         compute: |inputs| {
             let (r1, r2) = (inputs.number("r1")?, inputs.number("r2")?);
             Ok(throughput::coaxial_disks(r1, r2, inputs.number("h")?)?.m2_sr().into())
+        },
+    },
+    Quantity {
+        name: "throughput-spot-detector",
+        inputs: &[
+            Input::new("pupil_radius", "m, of the entrance pupil"),
+            Input::new("spot_radius", "m, of the spot across the axis, on the sample"),
+            Input::new("distance", "m, from pupil to spot"),
+        ],
+        unit: "m² sr",
+        example: "--pupil-radius 0.00625 --spot-radius 0.0025 --distance 0.3",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let (pupil, spot) = (inputs.number("pupil_radius")?, inputs.number("spot_radius")?);
+            let throughput = throughput::coaxial_disks(pupil, spot, inputs.number("distance")?)?;
+            Ok(throughput.m2_sr().into())
+        },
+    },
+    Quantity {
+        name: "throughput-infinitesimal-beam",
+        inputs: &[
+            Input::new("area1", "m², small beside distance²"),
+            Input::new("theta1", "rad, from its normal to the beam, 0 to π/2"),
+            Input::new("area2", "m²"),
+            Input::new("theta2", "rad, from its normal to the beam, 0 to π/2"),
+            Input::new("distance", "m"),
+        ],
+        unit: "m² sr",
+        example: "--area1 1e-6 --theta1 0 --area2 2e-6 --theta2 0.5 --distance 0.3",
+        rounding: ROUNDING,
+        compute: |inputs| {
+            let end = |area, theta| {
+                Ok::<_, Refusal>((Area::from_m2(inputs.number(area)?), inputs.number(theta)?))
+            };
+            let (from, to) = (end("area1", "theta1")?, end("area2", "theta2")?);
+            let distance = inputs.number("distance")?;
+            Ok(throughput::infinitesimal_beam(from, to, distance)?.m2_sr().into())
+        },
+    },
+    Quantity {
+        name: "throughput-polygons",
+        inputs: &[
+            Input::new("from", "list of [x,y,z], m; the order of vertices means nothing"),
+            Input::new("to", "list of [x,y,z], m"),
+            Input::optional("relative_tolerance", "default 1e-10"),
+        ],
+        unit: "m² sr",
+        example: "--from [[0,0,0],[1,0,0],[1,1,0],[0,1,0]] \
+                  --to [[0,0,1],[0,1,1],[1,1,1],[1,0,1]] --relative-tolerance 1e-8",
+        rounding: Rounding::Stated,
+        compute: |inputs| {
+            let polygon = |name| Ok::<_, Refusal>(Polygon::new(inputs.vectors(name)?)?);
+            let (from, to) = (polygon("from")?, polygon("to")?);
+            Ok(form_factor::throughput_of_polygons(&from, &to, tolerance(inputs)?)?.into())
         },
     },
     Quantity {
@@ -118,14 +174,36 @@ pub(super) const QUANTITIES: &[Quantity] = &[
         },
     },
     Quantity {
-        name: "exitance",
-        inputs: &[RADIANCE],
-        unit: "W/m²",
-        example: "--radiance 100",
+        name: "radiant-flux",
+        inputs: &[RADIANCE, Input::new("throughput", "m² sr")],
+        unit: "W",
+        example: "--radiance 100 --throughput 2.5e-8",
         rounding: Rounding::Relative(2.3e-16),
         compute: |inputs| {
-            // Of a diffuse emitter: π L.
-            let hemisphere = ProjectedSolidAngle::from_sr(PI);
+            let throughput = Throughput::from_m2_sr(not_negative(inputs, "throughput")?);
+            Ok((radiance(inputs)? * throughput).w().into())
+        },
+    },
+    Quantity {
+        name: "radiance-from-exitance",
+        inputs: &[Input::new("exitance", "W/m², of a diffuse emitter")],
+        unit: "W/(m² sr)",
+        example: "--exitance 314.15926",
+        rounding: Rounding::Relative(4.6e-16),
+        compute: |inputs| {
+            let exitance = Exitance::from_w_per_m2(not_negative(inputs, "exitance")?);
+            Ok((exitance / ProjectedSolidAngle::HEMISPHERE).w_per_m2_sr().into())
+        },
+    },
+    Quantity {
+        name: "exitance",
+        inputs: &[Input::new("radiance", "W/(m² sr), of a diffuse emitter")],
+        unit: "W/m²",
+        example: "--radiance 100",
+        rounding: Rounding::Relative(4.6e-16),
+        compute: |inputs| {
+            // π L.
+            let hemisphere = ProjectedSolidAngle::HEMISPHERE;
             Ok(radiance(inputs)?.exitance_into(hemisphere).w_per_m2().into())
         },
     },
@@ -156,7 +234,7 @@ fn body(inputs: Inputs<'_>) -> Result<ConvexBody, Refusal> {
 }
 
 fn radiance(inputs: Inputs<'_>) -> Result<Radiance, Refusal> {
-    Ok(Radiance::from_w_per_m2_sr(between(inputs, "radiance", 0.0, f64::MAX)?))
+    Ok(Radiance::from_w_per_m2_sr(not_negative(inputs, "radiance")?))
 }
 
 fn angle(inputs: Inputs<'_>, max: f64) -> Result<f64, Refusal> {

@@ -4,12 +4,15 @@
 
 mod angles;
 mod bases;
+mod enclosures;
 mod form_factors;
 mod inputs;
 mod interfaces;
+mod irradiance;
 mod least_squares;
 mod light;
 mod motion;
+mod photometric;
 mod quantity;
 mod rays;
 mod request;

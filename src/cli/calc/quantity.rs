@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 use super::inputs::Inputs;
 use super::{
-    angles, bases, form_factors, interfaces, least_squares, light, motion, rays, solid_angles,
-    statistics,
+    angles, bases, enclosures, form_factors, interfaces, irradiance, least_squares, light, motion,
+    photometric, rays, solid_angles, statistics,
 };
 
 /// The families, in the order in which they are listed.
@@ -19,6 +19,9 @@ const FAMILIES: &[&[Quantity]] = &[
     solid_angles::QUANTITIES,
     form_factors::QUANTITIES,
     light::QUANTITIES,
+    irradiance::QUANTITIES,
+    enclosures::QUANTITIES,
+    photometric::QUANTITIES,
     interfaces::QUANTITIES,
     rays::QUANTITIES,
     bases::QUANTITIES,
@@ -79,6 +82,12 @@ impl Answer {
     /// A value whose error the function that found it bounds.
     pub(super) fn within(value: f64, error_bound: f64) -> Self {
         Self { value: number(value), error_bound: Some(error_bound) }
+    }
+
+    /// Values, each of whose errors is bounded.
+    pub(super) fn list_within(values: impl Iterator<Item = f64>, error_bound: f64) -> Self {
+        let values: Vec<Value> = values.map(number).collect();
+        Self { value: values.into(), error_bound: Some(error_bound) }
     }
 
     /// Every number in it, whatever the shape.
@@ -156,6 +165,15 @@ pub(super) fn tolerance(inputs: Inputs<'_>) -> Result<Tolerance, Refusal> {
     } else {
         Ok(Tolerance::default())
     }
+}
+
+/// A finite number that is not below zero.
+pub(super) fn not_negative(inputs: Inputs<'_>, name: &str) -> Result<f64, Refusal> {
+    let value = inputs.number(name)?;
+    if value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Refusal::new(format!("{name} is {value}, expected 0 or more")))
 }
 
 impl Quantity {

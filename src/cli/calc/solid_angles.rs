@@ -235,15 +235,15 @@ pub(super) const QUANTITIES: &[Quantity] = &[
     },
 ];
 
-fn receiver(inputs: Inputs<'_>) -> Result<Receiver, Refusal> {
+pub(super) fn receiver(inputs: Inputs<'_>) -> Result<Receiver, Refusal> {
     Ok(Receiver::new(inputs.vector("point")?, inputs.direction("normal")?)?)
 }
 
-fn disk(inputs: Inputs<'_>, axis: DVec3) -> Result<Disk, Refusal> {
+pub(super) fn disk(inputs: Inputs<'_>, axis: DVec3) -> Result<Disk, Refusal> {
     Ok(Disk::new(inputs.vector("center")?, axis, inputs.number("radius")?)?)
 }
 
-fn sphere(inputs: Inputs<'_>) -> Result<Sphere, Refusal> {
+pub(super) fn sphere(inputs: Inputs<'_>) -> Result<Sphere, Refusal> {
     Ok(Sphere::new(inputs.vector("center")?, inputs.number("radius")?)?)
 }
 
@@ -260,7 +260,7 @@ fn polygon(body: Inputs<'_>) -> Result<Polygon, Refusal> {
 }
 
 /// Disks lie across the z axis.
-fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
+pub(super) fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
     match body.text("kind")? {
         "polygon" => Ok(Source::Polygon(polygon(body)?)),
         "disk" => {
