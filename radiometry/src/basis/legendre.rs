@@ -56,6 +56,66 @@ impl Legendre {
     }
 }
 
+/// Products of two Legendre polynomials over the square [-1, 1]², for what varies over the sample's
+/// area: √(2a+1) Pₐ(x) times its like of degree b in y, of limited total degree a + b. By total
+/// degree, then by b; the mean of a square over the square is 1, of a product of two different ones 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegendreProducts(Legendre);
+
+impl LegendreProducts {
+    /// All of them up to a total degree.
+    pub fn new(total_degree: usize) -> Self {
+        Self(Legendre::new(total_degree))
+    }
+
+    /// The highest total degree d.
+    pub fn degree(&self) -> usize {
+        self.0.degree()
+    }
+
+    /// How many there are: (d+1)(d+2)/2.
+    #[expect(clippy::len_without_is_empty, reason = "there is always the constant")]
+    pub fn len(&self) -> usize {
+        (self.degree() + 1) * (self.degree() + 2) / 2
+    }
+
+    /// The degrees (a, b) in x and y of every product, in order.
+    pub fn degrees(&self) -> impl Iterator<Item = (usize, usize)> {
+        (0..=self.degree()).flat_map(|total| (0..=total).map(move |b| (total - b, b)))
+    }
+
+    /// All values at (x, y), into `values` (of length [`len`](Self::len), or it panics), without a
+    /// heap. A place a little outside the square is extrapolated.
+    ///
+    /// ```
+    /// let products = radiometry::basis::LegendreProducts::new(1);
+    /// let mut values = [0.0; 3];
+    /// products.evaluate(1.0, -1.0, &mut values);
+    /// assert_eq!(values, [1.0, 3f64.sqrt(), -3f64.sqrt()]); // 1, x, y
+    /// ```
+    pub fn evaluate(&self, x: f64, y: f64, values: &mut [f64]) {
+        assert_eq!(values.len(), self.len(), "one value a product");
+        let steps = &self.0.steps;
+        let mut along_y = Recurrence::new(1.0 - y.abs());
+        for b in 0..=self.degree() {
+            let mut along_x = Recurrence::new(1.0 - x.abs());
+            for a in 0..=self.degree() - b {
+                let is_negative = (x < 0.0 && a % 2 == 1) != (y < 0.0 && b % 2 == 1);
+                let product =
+                    self.0.norms[a] * along_x.value() * (self.0.norms[b] * along_y.value());
+                let total = a + b;
+                values[total * (total + 1) / 2 + b] = if is_negative { -product } else { product };
+                if let Some(step) = steps.get(a) {
+                    along_x.advance(*step);
+                }
+            }
+            if let Some(step) = steps.get(b) {
+                along_y.advance(*step);
+            }
+        }
+    }
+}
+
 /// The Legendre polynomial of a degree with P(1) = 1, at x in [-1, 1].
 ///
 /// ```

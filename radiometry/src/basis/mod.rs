@@ -12,5 +12,5 @@ pub mod zernike;
 pub use active::{Active, DEGREE_MAX};
 pub use bspline::BSpline;
 pub use harmonics::{HemisphericalHarmonics, SphericalHarmonics};
-pub use legendre::Legendre;
+pub use legendre::{Legendre, LegendreProducts};
 pub use zernike::Zernike;

@@ -33,7 +33,7 @@ struct Member {
 }
 
 impl Zernike {
-    /// All of them up to a degree; stable to degree 60 and beyond (2e-14 of the largest value).
+    /// All of them up to a degree; 2e-14 of the largest value at degree 60, 4e-13 at 200.
     pub fn new(degree: usize) -> Self {
         let families = (0..=degree).map(|m| family(m, degree)).collect();
         Self { degree, families }
@@ -72,10 +72,17 @@ impl Zernike {
         let one_minus_x = 2.0 * direction.z * direction.z;
         // (x + iy)^m = r^m (cos mφ + i sin mφ): exact zeros at the pole, no angle needed.
         let (mut re, mut im) = (1.0, 0.0);
-        for family in &self.families {
+        for (m, family) in self.families.iter().enumerate() {
+            // Those of m = 0 are Legendre polynomials, even or odd in x: near the pole, where x is -1,
+            // they are as exact as at the rim. For m > 0 the power of r takes care of that.
+            let is_mirrored = m == 0 && one_minus_x > 1.0;
+            let one_minus_x =
+                if is_mirrored { 2.0 * direction.truncate().length_squared() } else { one_minus_x };
             let mut radial = Recurrence::new(one_minus_x);
+            let mut sign = 1.0;
             for member in family {
-                let amplitude = member.norm * radial.value();
+                let amplitude = sign * member.norm * radial.value();
+                sign = if is_mirrored { -sign } else { sign };
                 // For m = 0 both are one place, and the cosine is written last.
                 values[member.sin_index] = amplitude * im;
                 values[member.cos_index] = amplitude * re;
@@ -146,6 +153,11 @@ pub fn radial(n: usize, m: usize, r: f64) -> Result<f64, DomainError> {
         return Ok(0.0);
     }
     let one_minus_x = 2.0 * (1.0 - r) * (1.0 + r);
+    // A Legendre polynomial, even or odd in x = 2r² - 1: as exact at the pole as at the rim.
+    if m == 0 && one_minus_x > 1.0 {
+        let sign = if n.is_multiple_of(4) { 1.0 } else { -1.0 };
+        return Ok(sign * jacobi::polynomial(n / 2, 0, 2.0 * r * r));
+    }
     Ok(libm::pow(r, m as f64) * jacobi::polynomial((n - m) / 2, m, one_minus_x))
 }
 
