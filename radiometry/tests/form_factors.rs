@@ -215,6 +215,68 @@ fn random_polygons_are_reciprocal_and_their_bounds_hold_against_closed_forms() {
 }
 
 #[test]
+fn strips_that_lie_across_a_line_count_by_the_part_in_front_of_it() {
+    let mut chance = Chance(29);
+    let mut counts = [0; 3];
+    for _ in 0..400 {
+        let mut point = || DVec2::new(2.0 * chance.next(), chance.next());
+        let (p, q) = ([point(), point()], [point(), point()]);
+        let there = form_factor::strips(p, q);
+        let back = form_factor::strips(q, p);
+        let left = |of: [DVec2; 2], x: DVec2| (of[1] - of[0]).perp_dot(x - of[0]);
+        let sides = |of: [DVec2; 2], x: [DVec2; 2]| x.map(|x| left(of, x) > 0.0);
+        let straddles = |of, x| sides(of, x)[0] != sides(of, x)[1];
+        match (straddles(p, q), straddles(q, p)) {
+            (true, true) => {
+                counts[0] += 1;
+                assert!(there.is_err() && back.is_err());
+                continue;
+            }
+            (false, false) => counts[1] += 1,
+            _ => counts[2] += 1,
+        }
+        let (there, back) = (there.unwrap().ratio(), back.unwrap().ratio());
+        let (a, b) = (p[0].distance(p[1]), q[0].distance(q[1]));
+        assert!(close(a * there, b * back, 1e-14), "{p:?} {q:?}");
+        // By sight: from each point of p, the sines between the ends of what is before it.
+        const STEPS: u32 = 1500;
+        let (normal_p, normal_q) = ((p[1] - p[0]).perp() / a, (q[1] - q[0]).perp() / b);
+        let face = |of: [DVec2; 2], others: [DVec2; 2]| match sides(of, others) {
+            [false, false] => -1.0,
+            _ => 1.0,
+        };
+        let (face_p, face_q) = (face(p, q), face(q, p));
+        let mut sum = 0.0;
+        for i in 0..STEPS {
+            let x = p[0].lerp(p[1], (f64::from(i) + 0.5) / f64::from(STEPS));
+            if face_q * left(q, x) <= 0.0 {
+                continue;
+            }
+            for j in 0..60 {
+                let y = q[0].lerp(q[1], (f64::from(j) + 0.5) / 60.0);
+                let ray = y - x;
+                let cosines = [face_p * normal_p.dot(ray), -face_q * normal_q.dot(ray)];
+                if cosines[0] > 0.0 && cosines[1] > 0.0 {
+                    sum += cosines[0] * cosines[1] / (2.0 * ray.length().powi(3)) * b / 60.0;
+                }
+            }
+        }
+        let nearest = [p[0], p[1], q[0], q[1]].map(|x| {
+            let segments = [p, q].map(|s| {
+                let along = s[1] - s[0];
+                let t = ((x - s[0]).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+                x.distance(s[0] + along * t)
+            });
+            segments[0].max(segments[1])
+        });
+        let gap = nearest.into_iter().fold(f64::MAX, f64::min);
+        let mean = sum / f64::from(STEPS);
+        assert!(gap < 0.1 || (mean - there).abs() < 0.02, "{p:?} {q:?}: {there} {mean}");
+    }
+    assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+}
+
+#[test]
 fn nothing_given_makes_a_nan_or_a_panic() {
     let odd = [0.0, -0.0, 1.0, -1.0, 1e-320, 1e-200, 1e200, f64::MAX, f64::INFINITY, f64::NAN, 2.5];
     let mut chance = Chance(13);

@@ -11,9 +11,13 @@ use crate::error_free::DoubleDouble;
 use crate::quantity::FormFactor;
 
 /// From the strip p₀p₁ to the strip q₀q₁, infinite across the plane of the points, by Hottel's crossed
-/// strings (1954; Howell C-1 to C-5): (crossed - uncrossed)/(2 |p₀p₁|). The strips may share an edge;
-/// neither may cross the line of the other. In double-double and rationalised twice, so that strips far
-/// apart keep their digits.
+/// strings (1954; Howell C-1 to C-5): (crossed - uncrossed)/(2 |p₀p₁|). In double-double and rationalised
+/// twice, so that strips far apart keep their digits.
+///
+/// Each strip acts by the face that it turns to the other. Where the plane of one cuts the other, the
+/// one acts by its left alone (going from its first edge to its second) and the part of the other on
+/// its right is left out, as if the strings were wrapped around its edge. The strips may touch; refused
+/// are strips that run through each other. A second strip without width receives nothing.
 ///
 /// ```
 /// use glam::dvec2;
@@ -23,6 +27,12 @@ use crate::quantity::FormFactor;
 ///     [dvec2(0.0, 1.0), dvec2(1.0, 1.0)],
 /// )?;
 /// assert!((factor.ratio() - (2.0_f64.sqrt() - 1.0)).abs() < 1e-15);
+/// // A wall beside the floor, of which the half below it is not seen: 1 + 1 - √2, halved.
+/// let sunk = radiometry::form_factor::strips(
+///     [dvec2(0.0, 0.0), dvec2(1.0, 0.0)],
+///     [dvec2(0.0, -1.0), dvec2(0.0, 1.0)],
+/// )?;
+/// assert!((sunk.ratio() - (1.0 - 0.5_f64.sqrt())).abs() < 1e-15);
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
 pub fn strips(from: [DVec2; 2], to: [DVec2; 2]) -> Result<FormFactor, DomainError> {
@@ -34,14 +44,16 @@ pub fn strips(from: [DVec2; 2], to: [DVec2; 2]) -> Result<FormFactor, DomainErro
     let eighths = core::array::from_fn::<_, 8, _>(|i| numbers.as_flattened()[i] / 8.0);
     let [p0x, p0y, p1x, p1y, q0x, q0y, q1x, q1y] = scaled(eighths);
     let point = |x: f64, y: f64| [DoubleDouble::from_f64(x), DoubleDouble::from_f64(y)];
-    let (p0, p1, q0, q1) = (point(p0x, p0y), point(p1x, p1y), point(q0x, q0y), point(q1x, q1y));
-    let (along_p, along_q) = (between(p0, p1), between(q0, q1));
-    let width = length(along_p).to_f64();
+    let (p, q) = ([point(p0x, p0y), point(p1x, p1y)], [point(q0x, q0y), point(q1x, q1y)]);
+    let width = length(between(p[0], p[1])).to_f64();
     positive("width_from_m", width)?;
-    positive("width_to_m", length(along_q).to_f64())?;
-    let cross = |a: Vector, b: Vector| a[0].mul(b[1]).sub(a[1].mul(b[0])).to_f64();
-    facing("from", cross(along_q, between(q0, p0)), cross(along_q, between(q0, p1)))?;
-    facing("to", cross(along_p, between(p0, q0)), cross(along_p, between(p0, q1)))?;
+    let ([p0, p1], [q0, q1]) = match (straddles(p, q), straddles(q, p)) {
+        (true, true) => return Err(CROSSING),
+        (true, false) => (to_the_left(p, q), q),
+        (false, true) => (p, to_the_left(q, p)),
+        (false, false) => (p, q),
+    };
+    let (along_p, along_q) = (between(p0, p1), between(q0, q1));
 
     // Strings from p₀ to q₁ and q₀ (a, b), from p₁ likewise (c, d).
     let [a, b, c, d] = [between(p0, q1), between(p0, q0), between(p1, q1), between(p1, q0)];
@@ -83,13 +95,30 @@ fn slope(step: Vector, a: Vector, b: Vector) -> DoubleDouble {
     dot(step, [a[0].add(b[0]), a[1].add(b[1])]).div(lengths)
 }
 
-/// Both ends of a strip on one side of the other's line.
-fn facing(argument: &'static str, start: f64, end: f64) -> Result<(), DomainError> {
-    if (start < 0.0 && end > 0.0) || (start > 0.0 && end < 0.0) {
-        let expected = "a strip on one side of the other's plane";
-        return Err(DomainError::Placing { argument, expected });
-    }
-    Ok(())
+const CROSSING: DomainError = DomainError::Placing {
+    argument: "to",
+    expected: "a strip that does not run through the other",
+};
+
+/// How far to the left of a strip's line a point is, times its width.
+fn left_of(strip: [Vector; 2], x: Vector) -> DoubleDouble {
+    let (along, away) = (between(strip[0], strip[1]), between(strip[0], x));
+    along[0].mul(away[1]).sub(along[1].mul(away[0]))
+}
+
+/// Whether a strip lies on both sides of the other's line.
+fn straddles(strip: [Vector; 2], other: [Vector; 2]) -> bool {
+    let [start, end] = strip.map(|x| left_of(other, x).to_f64());
+    (start < 0.0 && end > 0.0) || (start > 0.0 && end < 0.0)
+}
+
+/// The part of a strip to the left of the line of the other, which it straddles.
+fn to_the_left(strip: [Vector; 2], other: [Vector; 2]) -> [Vector; 2] {
+    let [start, end] = strip.map(|x| left_of(other, x));
+    let part = start.div(start.sub(end));
+    let along = between(strip[0], strip[1]);
+    let crossing = [0, 1].map(|i| strip[0][i].add(along[i].mul(part)));
+    if start.to_f64() > 0.0 { [strip[0], crossing] } else { [crossing, strip[1]] }
 }
 
 /// Between two equal, parallel, infinite cylinders (Howell C-63): (√(X²-1) + asin(1/X) - X)/π with
