@@ -233,7 +233,7 @@ fn less_its_sine(x: f64) -> f64 {
         return x - libm::sin(x);
     }
     let square = x * x;
-    let tail = [156.0, 110.0, 72.0, 42.0, 20.0]
+    let tail = [342.0, 272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0]
         .into_iter()
         .fold(1.0, |series, next| 1.0 - square / next * series);
     square * x / 6.0 * tail
