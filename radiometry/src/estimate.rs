@@ -71,9 +71,12 @@ impl Tolerance {
 }
 
 impl Tolerance {
-    /// For an integral that a factor will make the value of: the relative tolerance stays.
+    /// For an integral that a factor will make the value of: the relative tolerance stays, but for what the
+    /// factor's own roundings need of it.
     pub(crate) fn before_factor(self, factor: f64) -> Self {
-        Self { absolute: (self.absolute / factor).min(f64::MAX), ..self }
+        const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
+        let relative = (self.relative - ROUNDINGS).max(0.5 * self.relative);
+        Self { relative, absolute: (self.absolute / factor).min(f64::MAX), ..self }
     }
 }
 

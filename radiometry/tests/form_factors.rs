@@ -26,7 +26,7 @@ fn every_reference_case_is_met_and_every_bound_holds() {
                 let error = (got.value - expected).abs();
                 if error > allowed {
                     misses.push(format!("{said}: {got:?}, expected {expected:e} ± {allowed:e}"));
-                } else if error > got.error_bound + 2e-14 * expected {
+                } else if error > got.error_bound + written(got) * expected {
                     misses.push(format!("{said}: off by {error:e}, {got:?}"));
                 } else {
                     met += 1;
@@ -36,6 +36,12 @@ fn every_reference_case_is_met_and_every_bound_holds() {
     }
     assert!(misses.is_empty(), "{} missed:\n{}", misses.len(), misses.join("\n"));
     assert_eq!(met, 109);
+}
+
+/// What an exact value of 17 digits may miss; closed forms state no bound of their own but are held to
+/// 64 ulp.
+fn written(got: Estimate) -> f64 {
+    if got.evaluations > 0 { 5e-17 } else { 0.0 }
 }
 
 fn answer(quantity: &str, inputs: &Value) -> Result<Estimate, EstimateError> {
@@ -216,6 +222,7 @@ fn random_polygons_are_reciprocal_and_their_bounds_hold_against_closed_forms() {
 
 #[test]
 fn strips_that_lie_across_a_line_count_by_the_part_in_front_of_it() {
+    const STEPS: u32 = 1500;
     let mut chance = Chance(29);
     let mut counts = [0; 3];
     for _ in 0..400 {
@@ -239,7 +246,6 @@ fn strips_that_lie_across_a_line_count_by_the_part_in_front_of_it() {
         let (a, b) = (p[0].distance(p[1]), q[0].distance(q[1]));
         assert!(close(a * there, b * back, 1e-14), "{p:?} {q:?}");
         // By sight: from each point of p, the sines between the ends of what is before it.
-        const STEPS: u32 = 1500;
         let (normal_p, normal_q) = ((p[1] - p[0]).perp() / a, (q[1] - q[0]).perp() / b);
         let face = |of: [DVec2; 2], others: [DVec2; 2]| match sides(of, others) {
             [false, false] => -1.0,

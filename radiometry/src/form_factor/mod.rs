@@ -52,7 +52,8 @@ fn form_factor(ratio: f64) -> Result<FormFactor, DomainError> {
     Ok(FormFactor::from_ratio(ratio.clamp(0.0, 1.0)))
 }
 
-/// The same for one that was integrated, `scale` times a part known in closed form and an integral.
+/// The same for one that was integrated, `scale` times a part known in closed form and an integral. The
+/// scale's own roundings count: a handful of products under it and one with it.
 fn integrated(
     integral: Result<Estimate, EstimateError>,
     known: f64,
@@ -70,6 +71,10 @@ fn integrated(
         ..integral
     }
     .scaled(scale);
+    let factor = Estimate {
+        error_bound: 4.0f64.mul_add(f64::EPSILON * factor.value.abs(), factor.error_bound),
+        ..factor
+    };
     if factor.value.is_nan() {
         return Err(UNLIKE_SIZES.into());
     }

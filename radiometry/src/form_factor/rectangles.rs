@@ -4,16 +4,19 @@
 //! as the overlap of one side with the other shifted by v; what is left is a one-dimensional integral
 //! over v of a positive function.
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 
 use super::{form_factor, integrated, scaled};
 use crate::domain::{DomainError, finite, not_negative, positive, within};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
-use crate::quadrature::{Sum, adaptive_between};
+use crate::quadrature::{Sum, adaptive_between, adaptive_noisy};
 use crate::quantity::FormFactor;
 
 /// Sums whose terms are larger than this times the sum give way to a positive integral.
 const CANCELLATION_MAX: f64 = 30.0;
+
+/// Of an integrand that is a product of a dozen positive factors and sums.
+const ROUNDINGS: f64 = 12.0 * f64::EPSILON;
 
 /// What the integral that stands in for a closed form is asked for.
 fn kernel() -> Tolerance {
@@ -178,22 +181,29 @@ pub fn wedge_rectangles(
     }
     let [a, b, l] = scaled([width_from_m, width_to_m, edge_m].map(|length| length / 4.0));
     let phi = libm::atan2(sin_phi, cos_phi);
-    // Lines that end at the far edge of a, and those that end at the far edge of b.
-    let sides = [
-        (a, libm::atan2(b * sin_phi, a - b * cos_phi)),
-        (b, libm::atan2(a * sin_phi, b - a * cos_phi)),
+    // Lines that end at the far edge of a, and those that end at the far edge of b: π - φ together.
+    let ends = [
+        libm::atan2(b * sin_phi, (-b).mul_add(cos_phi, a)),
+        libm::atan2(a * sin_phi, (-a).mul_add(cos_phi, b)),
     ];
     let lines = |place: f64| {
-        let (side, fraction) = if place < 1.0 { (0, place) } else { (1, place - 1.0) };
-        let (width, beta_max) = sides[side];
+        let (width, beta_max, other, fraction) = if place < 1.0 {
+            (a, ends[0], ends[1], place)
+        } else {
+            (b, ends[1], ends[0], place - 1.0)
+        };
         let beta = beta_max * fraction;
-        let sin = libm::sin(phi + beta);
+        // sin(φ + β) by the angle or its supplement, a sum of positive terms either way.
+        let turned = phi + beta;
+        let acute = if turned < FRAC_PI_2 { turned } else { other + beta_max * (1.0 - fraction) };
+        let sin = libm::sin(acute);
         let longest = width * sin_phi / sin;
-        beta_max * libm::sin(beta) * sin * lines_along(longest, l)
+        let value = beta_max * libm::sin(beta) * sin * lines_along(longest, l);
+        (value, ROUNDINGS * value.abs())
     };
     let scale = 1.0 / (PI * a * sin_phi);
     let wanted = tolerance.before_factor(scale);
-    integrated(adaptive_between(lines, &[0.0, 1.0, 2.0], wanted), 0.0, scale, tolerance)
+    integrated(adaptive_noisy(lines, &[0.0, 1.0, 2.0], wanted), 0.0, scale, tolerance)
 }
 
 /// Q(R) = ∫ atan(l/r) dr from 0 to R.
