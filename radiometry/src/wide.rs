@@ -31,6 +31,15 @@ impl WideVec {
         }
     }
 
+    pub(crate) fn new(x: DoubleDouble, y: DoubleDouble, z: DoubleDouble) -> Self {
+        Self { x, y, z }
+    }
+
+    /// x, y, z.
+    pub(crate) fn components(self) -> [DoubleDouble; 3] {
+        [self.x, self.y, self.z]
+    }
+
     /// Each component rounded to the nearest double.
     pub(crate) fn to_vec(self) -> DVec3 {
         DVec3::new(self.x.to_f64(), self.y.to_f64(), self.z.to_f64())
@@ -70,6 +79,13 @@ impl WideVec {
 
     pub(crate) fn length(self) -> DoubleDouble {
         self.dot(self).sqrt()
+    }
+
+    /// Of length 1, with all digits; the zero vector has no direction.
+    pub(crate) fn unit(self) -> Option<Self> {
+        let scaled = self.normal_sized();
+        let length = scaled.length();
+        (length.to_f64() > 0.0).then(|| scaled.times(DoubleDouble::from_f64(1.0).div(length)))
     }
 
     /// The power of two of the largest component; none for the zero vector.

@@ -5,13 +5,20 @@
 //! Closed forms where they keep their digits; where they cancel, the same positive integrand by Gauss
 //! quadrature. It knows no radiance and no rig.
 
+mod body;
 mod disk;
+mod hull;
+mod limit;
 mod occluded;
 mod outline;
+mod pierced;
 mod polygon;
+mod scene;
 mod seen;
+mod shadow;
 pub(crate) mod smooth;
 mod sphere;
+mod view;
 
 use core::f64::consts::PI;
 
@@ -20,9 +27,11 @@ use glam::DVec3;
 use crate::domain::{DomainError, direction, finite_vector};
 use crate::quantity::ProjectedSolidAngle;
 
+pub use body::{Occluder, Source};
 pub use disk::{disk, disk_parallel, disk_tilted};
-pub use occluded::{Occluder, Source, occluded};
+pub use occluded::{occluded, occluded_by};
 pub use polygon::polygon;
+pub use shadow::{Region, RegionShadow, Shadow, region_shadow, shadow};
 pub use sphere::{sphere, sphere_tilted};
 
 /// A point with the normal of the surface that it belongs to.
