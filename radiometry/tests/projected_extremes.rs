@@ -5,10 +5,12 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use proptest::prelude::*;
-use radiometry::projected::{self, Receiver};
+use radiometry::projected::{
+    self, Occluder, Receiver, Region, Source, occluded_by, region_shadow, shadow,
+};
 use radiometry::quantity::ProjectedSolidAngle;
-use radiometry::shape::{Disk, Polygon, Sphere};
-use radiometry::{DomainError, solid_angle};
+use radiometry::shape::{Disk, HalfPlane, Polygon, Sphere};
+use radiometry::{DomainError, Estimate, EstimateError, Tolerance, solid_angle};
 
 fn number() -> impl Strategy<Value = f64> {
     let extremes = [
@@ -42,8 +44,70 @@ fn in_range(found: Result<ProjectedSolidAngle, DomainError>) {
     }
 }
 
+/// Of any size, in any place; many have no meaning.
+fn occluder() -> impl Strategy<Value = Occluder> {
+    let corners = prop::collection::vec(anything(), 3..6);
+    (0..4, anything(), anything(), number(), corners).prop_filter_map(
+        "a body",
+        |(kind, center, axis, radius, mut corners)| {
+            Some(match kind {
+                0 => Occluder::Disk(Disk::new(center, axis, radius.abs()).ok()?),
+                1 => Occluder::Sphere(Sphere::new(center, radius.abs()).ok()?),
+                2 => Occluder::HalfPlane(HalfPlane::new(center.x, radius).ok()?),
+                _ => {
+                    corners.truncate(3);
+                    Occluder::Polygon(Polygon::new(corners).ok()?)
+                }
+            })
+        },
+    )
+}
+
+fn source() -> impl Strategy<Value = Source> {
+    occluder().prop_filter_map("no half-plane shines", |body| match body {
+        Occluder::Disk(disk) => Some(Source::Disk(disk)),
+        Occluder::Sphere(ball) => Some(Source::Sphere(ball)),
+        Occluder::Polygon(polygon) => Some(Source::Polygon(polygon)),
+        Occluder::HalfPlane(_) => None,
+    })
+}
+
+fn estimated(found: Result<Estimate, EstimateError>) {
+    match found {
+        Ok(found) | Err(EstimateError::Unmet { estimate: found, .. }) => {
+            assert!((0.0..=PI).contains(&found.value), "{found:?}");
+            assert!(found.error_bound >= 0.0, "{found:?}");
+        }
+        Err(EstimateError::Domain(_)) => {}
+        Err(error @ EstimateError::Integrand { .. }) => panic!("{error}"),
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1500) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
+
+    #[test]
+    fn any_bodies_at_all_leave_a_number_in_range_or_an_error(
+        point in anything(), normal in anything(), source in source(),
+        bodies in prop::collection::vec(occluder(), 0..4),
+    ) {
+        if let Some(body) = bodies.first() {
+            let region = match &source {
+                Source::Disk(disk) => Some(Region::Disk(*disk)),
+                Source::Polygon(polygon) => Some(Region::Polygon(polygon.clone())),
+                Source::Sphere(_) => None,
+            };
+            // An answer or an error: what it says is held elsewhere.
+            let _ = region.map(|region| region_shadow(&region, &source, body));
+        }
+        let Ok(at) = Receiver::new(point, normal) else { return Ok(()) };
+        let _ = shadow(&at, &source, &bodies);
+        estimated(occluded_by(&at, &source, &bodies, Tolerance::default()));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
     #[test]
     fn anything_at_all_gives_a_number_in_range_or_an_error(

@@ -190,7 +190,8 @@ impl Curve {
         let speed = self.sine.abs().max_element() / self.base.abs().max_element();
         let search = Search { along, close: 1e-8 / speed.max(1.0) };
         let mut found = Vec::new();
-        search.run([self.start, self.start + self.turn], &mut found);
+        let mut halvings_left = HALVINGS_MAX;
+        search.run([self.start, self.start + self.turn], &mut halvings_left, &mut found);
         if found.is_empty() {
             return found;
         }
@@ -223,6 +224,9 @@ impl Curve {
     }
 }
 
+/// Four crossings at most, each of which is closed in on from either side: more are no search.
+const HALVINGS_MAX: u32 = 1000;
+
 /// A search for crossings, and how near to each other two of them are not told apart.
 #[derive(Debug, Clone, Copy)]
 struct Search {
@@ -233,7 +237,7 @@ struct Search {
 impl Search {
     /// Halves an interval until it holds no crossing or exactly one, by bounds of the function: none
     /// is missed but two that are too close.
-    fn run(&self, [from, to]: [f64; 2], found: &mut Vec<f64>) {
+    fn run(&self, [from, to]: [f64; 2], halvings_left: &mut u32, found: &mut Vec<f64>) {
         let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
         let (value, slope) = self.along.value_and_slope(middle);
         let bend = self.along.bend(from.abs().max(to.abs()));
@@ -244,9 +248,10 @@ impl Search {
         }
         if slope.abs() > bend * half {
             found.extend(self.root([from, to]));
-        } else if half > self.close {
-            self.run([from, middle], found);
-            self.run([middle, to], found);
+        } else if half > self.close && *halvings_left > 0 {
+            *halvings_left -= 1;
+            self.run([from, middle], halvings_left, found);
+            self.run([middle, to], halvings_left, found);
         }
     }
 

@@ -21,7 +21,7 @@ use crate::wide::{WideVec, in_units, length, unit_exponent};
 /// How much larger than their sum the terms of Lambert's formula may be: it costs so many ulp.
 const CANCELLATION: f64 = 32.0;
 /// Triangles that the integral may look at: slivers of 1e8 take some thousand.
-const CELLS_MAX: u32 = 100_000;
+const CELLS_MAX: u32 = 20_000;
 
 /// Projected solid angle of a polygon, convex or not, in any position; 0 from its plane outside it.
 /// Its vertices on the horizon count as visible. Refused: a receiver in the polygon itself. Rig: a

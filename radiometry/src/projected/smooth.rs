@@ -13,7 +13,7 @@ const AGREEMENT: f64 = 1e-13;
 const DEPTH_MAX: u32 = 60;
 /// Halvings in all: a smooth integrand takes some hundred. One that asks for more has lost its
 /// digits to the extremes of its arguments.
-const HALVINGS_MAX: u32 = 20_000;
+const HALVINGS_MAX: u32 = 2_000;
 
 /// ∫ f over [from, to]; 0 if the interval is empty, NaN where it does not settle.
 pub(crate) fn integral(from: f64, to: f64, f: &impl Fn(f64) -> f64) -> f64 {
