@@ -217,10 +217,14 @@ impl Visible<'_> {
         /// Of the tolerance, for each of the arcs' quadratures.
         const SHARE: f64 = 0.01;
         let absolute = SHARE * tolerance.allowed(whole);
+        let lost = DomainError::Lost { result: "projected solid angle (sr)" };
         let (mut sum, mut magnitude) = (Sum::default(), 0.0);
         let (mut bound, mut evaluations) = (0.0, 0);
         for (sign, curve, ends) in &self.arcs {
-            let arc = curve.arc(*ends, &self.scene.view, absolute)?;
+            let arc = match curve.arc(*ends, &self.scene.view, absolute) {
+                Err(EstimateError::Integrand { .. }) => return Err(lost.into()),
+                other => other?,
+            };
             sum.add(sign * arc.value);
             magnitude += arc.value.abs();
             bound += arc.error_bound;
@@ -229,7 +233,11 @@ impl Visible<'_> {
         // Ends of arcs that should meet miss each other by a rounding of a direction.
         let rounding = 128.0 * f64::EPSILON * (magnitude + whole);
         let unseen = 4.0 * BESIDE * whole;
-        Ok(Estimate { value: sum.value(), error_bound: bound + rounding + unseen, evaluations })
+        let (value, error_bound) = (sum.value(), bound + rounding + unseen);
+        if !(value + error_bound).is_finite() {
+            return Err(lost.into());
+        }
+        Ok(Estimate { value, error_bound, evaluations })
     }
 }
 
