@@ -42,6 +42,12 @@ impl Unmeasured {
     }
 }
 
+impl std::fmt::Display for Unmeasured {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 impl<E: std::error::Error> From<E> for Unmeasured {
     fn from(error: E) -> Self {
         Self(error.to_string())

@@ -14,6 +14,8 @@ pub struct Curve {
     pub name: String,
     /// Seconds and relative error; an error of 0 stands on [`FLOOR`].
     pub points: Vec<(f64, f64)>,
+    /// By a line, as the efforts of one method are; cases of their own are not.
+    pub is_joined: bool,
 }
 
 /// One problem.
@@ -77,8 +79,10 @@ fn plots<'a>(panel: &Panel, style: &impl Fn(&str) -> (&'a str, MarkerShape)) -> 
         let points: Vec<(f64, f64)> =
             curve.points.iter().map(|(s, error)| (*s, libm::log10(error.max(FLOOR)))).collect();
         let single = points.len() == 1;
-        let line = LinePlot::new().with_data(points.clone()).with_color(color);
-        plots.push(line.with_stroke_width(1.6).into());
+        if curve.is_joined {
+            let line = LinePlot::new().with_data(points.clone()).with_color(color);
+            plots.push(line.with_stroke_width(1.6).into());
+        }
         let marks = ScatterPlot::new().with_data(points).with_color(color).with_marker(marker);
         plots.push(marks.with_size(if single { 6.5 } else { 3.5 }).into());
     }
@@ -112,8 +116,11 @@ mod tests {
 
     #[test]
     fn errors_of_zero_have_a_place_and_every_curve_a_name() {
-        let curve =
-            |name: &str| Curve { name: name.into(), points: vec![(1e-7, 0.0), (1e-3, 1e-2)] };
+        let curve = |name: &str| Curve {
+            name: name.into(),
+            points: vec![(1e-7, 0.0), (1e-3, 1e-2)],
+            is_joined: true,
+        };
         let panel =
             Panel { title: "a square".into(), curves: vec![curve("closed"), curve("dice")] };
         let svg = error_against_time("all", &[panel], 1);

@@ -154,7 +154,7 @@ fn panels(spots: &[Spot]) -> Vec<Panel> {
     let curve = |study: &str, method: &str| {
         let points = spots.iter().filter(|spot| spot.study == study && spot.method == method);
         let points: Vec<_> = points.map(|spot| (spot.seconds, spot.error)).collect();
-        (!points.is_empty()).then(|| Curve { name: method.to_owned(), points })
+        (!points.is_empty()).then(|| Curve { name: method.to_owned(), points, is_joined: true })
     };
     let methods = [CLOSED, CONTOUR, "adaptive cubature", "quasi-Monte Carlo", "Monte Carlo"];
     let panel = |(study, _): &(&str, _)| Panel {
