@@ -2,8 +2,8 @@
 //! small box of them, dT/(dp₁ dp₂ dp₃ dp₄). And the two-dimensional chart of an environment.
 //!
 //! A beam has one throughput whatever it is written in; each chart has rays that it cannot name,
-//! and answers none for those. The fit integrates in the surface chart, the simulator's scenes
-//! throw rays in the others. Rays are lines with a sense here: where along one is not known.
+//! and answers none for those. For the page on ray charts; the rig's files and the fit write rays in the
+//! surface chart's coordinates. Rays are lines with a sense here: where along one is not known.
 
 use glam::DVec3;
 
@@ -11,6 +11,7 @@ use crate::direction::{angles, normalised, unit};
 use crate::domain::{DomainError, finite, finite_vector, positive, within};
 
 /// A line with a sense: the way light runs.
+/// Who needs it: the charts, which all name lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     point_m: DVec3,
@@ -45,6 +46,7 @@ impl Line {
 
 /// The surface chart: where a ray leaves the plane z = 0, and its direction from the normal +z.
 /// dT = cos θ sin θ dx dy dθ dφ. It names the rays with a direction in z > 0.
+/// Who needs it: the page on ray charts: the rig's own coordinates (x, y, θ, φ).
 ///
 /// ```
 /// use radiometry::chart::{Line, Surface};
@@ -93,6 +95,7 @@ impl Surface {
 /// The perpendicular chart: a ray's direction, and where it pierces the plane through the origin
 /// across it. dT = sin θ dθ dφ dx dy. It names every ray. The plane's x runs along the direction of
 /// growing θ, its y along that of growing φ; at the poles, where no frame is continuous, φ is 0.
+/// Who needs it: the page on ray charts: all light leaving an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Perpendicular {
     /// From +z, in [0, π], radians.
@@ -141,6 +144,7 @@ fn transverse(theta: f64, phi: f64) -> (DVec3, DVec3) {
 /// The two-plane chart: where a ray pierces the planes z = 0 and z = distance.
 /// dT = cos θ cos θ'/r² du dv ds dt, r the distance of both places. It names the rays with a
 /// direction in z > 0.
+/// Who needs it: the page on ray charts: light fields and camera arrays.
 ///
 /// ```
 /// use radiometry::chart::TwoPlane;
@@ -190,6 +194,7 @@ impl TwoPlane {
 
 /// The environment chart: the directions from which light comes to one point, from the receiver's
 /// normal +z. Two-dimensional: dΩ̃ = cos θ sin θ dθ dφ. It names the directions above the horizon.
+/// Who needs it: the page on ray charts: what arrives at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Environment {
     /// From +z, in [0, π/2], radians.
@@ -221,6 +226,7 @@ impl Environment {
 }
 
 /// Which of the lines the surface chart and the two-plane chart can name: those that run upward.
+/// Who needs it: the charts that name half of all rays only.
 pub fn upward(lines: &[Line]) -> Vec<bool> {
     lines.iter().map(|line| line.direction.z > 0.0).collect()
 }

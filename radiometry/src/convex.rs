@@ -10,6 +10,7 @@ use crate::domain::{DomainError, not_negative};
 use crate::quantity::{Area, ProjectedArea, Throughput};
 
 /// A closed convex body; lengths in metres, not negative. A flat one has two faces, a line no area.
+/// Who needs it: the page on Crofton's theorem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ConvexBody {
     /// A ball.
@@ -44,6 +45,7 @@ pub enum ConvexBody {
 }
 
 /// The mean over all directions of the area of a convex body's shadow: S/4.
+/// Who needs it: the page on Crofton's theorem.
 ///
 /// ```
 /// use radiometry::convex::{ConvexBody, mean_projected_area};
@@ -58,6 +60,7 @@ pub fn mean_projected_area(body: ConvexBody) -> Result<ProjectedArea, DomainErro
 
 /// The throughput of all rays that meet a convex body, from outside: π S, the projected solid angle of
 /// the hemisphere on each piece of the surface; or 4π Ā, all directions times the mean shadow.
+/// Who needs it: the page on Crofton's theorem and on the throughput of a sphere.
 ///
 /// ```
 /// use radiometry::convex::{ConvexBody, mean_projected_area, throughput};
@@ -79,6 +82,7 @@ pub fn throughput(body: ConvexBody) -> Result<Throughput, DomainError> {
 
 /// The area of the whole surface. Closed forms; the ellipsoid's is Carlson's (1979)
 /// S = `4π R_G(a²b², a²c², b²c²)`, by the arithmetic of its duplication theorem.
+/// Who needs it: the page on Crofton's theorem.
 ///
 /// ```
 /// use radiometry::convex::{ConvexBody, surface_area};

@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::error_free::{difference_of_products, two_sum};
 
 /// The unit vector of (θ, φ): (sin θ cos φ, sin θ sin φ, cos θ). Any angles.
+/// Who needs it: the rig, the plan and the simulator, wherever angles become a ray.
 ///
 /// ```
 /// use radiometry::direction::unit;
@@ -23,6 +24,7 @@ pub fn unit(theta: f64, phi: f64) -> DVec3 {
 
 /// (θ, φ) of a vector of any length: θ in [0, π], φ in (-π, π]. On the poles, where φ has no
 /// meaning, it is 0; so are both angles for the zero vector.
+/// Who needs it: the rig's calibration and the simulator's laws, wherever a ray becomes angles.
 ///
 /// ```
 /// use radiometry::direction::angles;
@@ -41,6 +43,7 @@ pub fn angles(direction: DVec3) -> (f64, f64) {
 
 /// An angle brought into (-π, π] by whole turns of the true 2π (the library reduces exactly; taking
 /// off the double nearest 2π is off by 2.4e-16 a turn).
+/// Who needs it: the rig's kinematics and whoever drives it by hand.
 ///
 /// ```
 /// use std::f64::consts::PI;
@@ -53,6 +56,7 @@ pub fn wrap(angle: f64) -> f64 {
 }
 
 /// An angle in degrees brought into (-180, 180], exactly.
+/// Who needs it: the plan, whose files are in degrees.
 ///
 /// ```
 /// assert_eq!(radiometry::direction::wrap_deg(540.0), 180.0);
@@ -65,6 +69,7 @@ pub fn wrap_deg(angle_deg: f64) -> f64 {
 
 /// The rotation from one angle to another by the shorter way, in (-π, π], exact for nearly equal
 /// angles and across the seam.
+/// Who needs it: the page on directions: the way of an axis across the seam.
 ///
 /// ```
 /// use radiometry::direction::shortest_rotation;
@@ -82,6 +87,7 @@ pub fn shortest_rotation(from: f64, to: f64) -> f64 {
 /// atan2(|a × b|, a · b) with each product in the cross product taken without loss (Kahan's
 /// difference of products), after scaling by powers of two. The arc cosine of the dot product
 /// answers 0 below 1.5e-8.
+/// Who needs it: the plan's and the rig's tests: how far a pose is off.
 ///
 /// ```
 /// use radiometry::direction::angle_between;
@@ -100,6 +106,7 @@ pub fn angle_between(a: DVec3, b: DVec3) -> f64 {
 
 /// The angle between the directions (θ₁, φ₁) and (θ₂, φ₂), in [0, π], from the angles themselves:
 /// haversine and its exact complement, so that neither end loses digits.
+/// Who needs it: the page on directions, for angles without vectors.
 ///
 /// ```
 /// use radiometry::direction::angular_distance;
@@ -118,12 +125,14 @@ pub fn angular_distance(theta_1: f64, phi_1: f64, theta_2: f64, phi_2: f64) -> f
 
 /// The unit vector half-way between two directions, on the shorter arc; none if they are opposite
 /// (every half-way direction would do) or one is the zero vector.
+/// Who needs it: the page on directions: averages on vectors.
 pub fn midpoint(a: DVec3, b: DVec3) -> Option<DVec3> {
     mean([a, b])
 }
 
 /// The direction of the mean of the unit vectors along the given directions; none if they cancel to
 /// rounding, if one is the zero vector or not finite, or if there are none.
+/// Who needs it: the rig's calibration, for the pose of a dwell.
 pub fn mean(directions: impl IntoIterator<Item = DVec3>) -> Option<DVec3> {
     let (mut sum, mut count) = (DVec3::ZERO, 0.0);
     for direction in directions {
@@ -137,6 +146,7 @@ pub fn mean(directions: impl IntoIterator<Item = DVec3>) -> Option<DVec3> {
 
 /// A vector of length 1 along `direction`, whatever its length; none for the zero vector and for
 /// components that are not finite.
+/// Who needs it: the simulator's emitters and every kernel here that is handed a direction.
 pub fn normalised(direction: DVec3) -> Option<DVec3> {
     if !direction.is_finite() || direction == DVec3::ZERO {
         return None;
@@ -148,6 +158,7 @@ pub fn normalised(direction: DVec3) -> Option<DVec3> {
 /// Two unit vectors that make a right-handed orthonormal frame with a unit normal: (t, b, n). There
 /// is no bad normal (Duff et al. 2017, JCGT 6:1, listing 3); like every such frame it jumps
 /// somewhere, here at z = 0.
+/// Who needs it: the simulator, to lay a lobe or a contact about a normal.
 pub fn frame(normal: DVec3) -> (DVec3, DVec3) {
     let sign = libm::copysign(1.0, normal.z);
     let a = -1.0 / (sign + normal.z);

@@ -25,6 +25,7 @@ const SWEEPS: usize = 100_000;
 const SETTLED: f64 = 1e-14;
 
 /// The form factors among surfaces that together leave no way out.
+/// Who needs it: the person at the rig, for a box or baffles; the page on form factors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Enclosure {
     areas_m2: Vec<f64>,
@@ -106,6 +107,7 @@ impl fmt::Display for EnclosureError {
 impl core::error::Error for EnclosureError {}
 
 /// The balance of an enclosure, one entry for each surface.
+/// Who needs it: the person at the rig, for the light that goes round in a box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radiosity {
     /// All that leaves: emitted and reflected.

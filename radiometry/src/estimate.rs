@@ -7,6 +7,7 @@ use crate::domain::{DomainError, not_negative, within};
 
 /// How well an integral shall be known, and what that may cost: done when the error's bound is at
 /// most `absolute` + `relative`·|value|, given up after `budget` evaluations of the integrand.
+/// Who needs it: every kernel without a closed form; the simulator's laws.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     relative: f64,
@@ -88,6 +89,7 @@ impl Default for Tolerance {
 }
 
 /// The value of an integral, with a bound of its error.
+/// Who needs it: every kernel without a closed form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// The value.

@@ -29,6 +29,7 @@ pub fn from_disk<W: Weighting>(
 }
 
 /// Irradiance from a sphere of uniform radiance: E = L Ω̃.
+/// Who needs it: the page on irradiance; `gonio calc`.
 ///
 /// ```
 /// use glam::DVec3;
@@ -49,6 +50,7 @@ pub fn from_sphere<W: Weighting>(
 }
 
 /// Irradiance from a polygon of uniform radiance: E = L Ω̃.
+/// Who needs it: the page on Lambert's formula; `gonio calc`.
 ///
 /// ```
 /// use glam::DVec3;
@@ -75,6 +77,7 @@ pub fn from_polygon<W: Weighting>(
 
 /// Irradiance, W·m⁻² (illuminance, lx, where a luminance is given), from a source of uniform radiance
 /// behind an occluder; see [`projected::occluded`] for the tolerance.
+/// Who needs it: the page on umbra and penumbra; `gonio calc`.
 pub fn from_occluded<W: Weighting>(
     receiver: &Receiver,
     source: &Source,
@@ -88,6 +91,7 @@ pub fn from_occluded<W: Weighting>(
 
 /// A uniformly bright Sun: the irradiance that it causes on a surface facing it, and the half angle
 /// under which it is seen.
+/// Who needs it: the simulator's lamps; the lecture's figures of the Sun.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sun {
     irradiance: Irradiance,

@@ -1,8 +1,8 @@
 //! Mean and variance of weighted readings, to the last digits: of a list at once, or as running moments
 //! that merge. They do not know what was read.
 //!
-//! Needed wherever readings are averaged: dwells on the rig, repeats, partial results of several
-//! runs. A list is taken from its first reading and in units of its spread, the second pass
+//! For whoever averages readings: dwells, repeats, partial results of several runs (`gonio calc`; the
+//! fit weights readings itself). A list is taken from its first reading and in units of its spread, the second pass
 //! corrected (Chan, Golub and `LeVeque` 1983), every sum compensated (Neumaier 1974).
 
 use crate::domain::{DomainError, finite, not_negative, positive, within};
@@ -10,6 +10,7 @@ use crate::error_free::two_sum;
 use crate::quadrature::Sum;
 
 /// Σ w v / Σ w; weights not negative, not all zero.
+/// Who needs it: whoever averages readings by hand: `gonio calc`.
 ///
 /// ```
 /// use radiometry::moments::weighted_mean;
@@ -24,6 +25,7 @@ pub fn weighted_mean(values: &[f64], weights: &[f64]) -> Result<f64, DomainError
 }
 
 /// Σ w (v - mean)²/Σ w, the variance of a population; an error beyond the largest double.
+/// Who needs it: whoever averages readings by hand: `gonio calc`.
 ///
 /// ```
 /// // An offset of 1e9 costs no digit.
@@ -37,6 +39,7 @@ pub fn weighted_variance(values: &[f64], weights: &[f64]) -> Result<f64, DomainE
 }
 
 /// The square root of [`weighted_variance`], also where that itself would overflow.
+/// Who needs it: whoever averages readings by hand: `gonio calc`.
 ///
 /// ```
 /// let deviation = radiometry::moments::weighted_std(&[1e200, 3e200], &[1.0, 1.0])?;
@@ -50,6 +53,7 @@ pub fn weighted_std(values: &[f64], weights: &[f64]) -> Result<f64, DomainError>
 }
 
 /// Σ (v - mean)²/(n - 1), of two values or more.
+/// Who needs it: whoever judges repeats by hand: `gonio calc`.
 ///
 /// ```
 /// assert_eq!(radiometry::moments::sample_variance(&[1.0, 2.0, 3.0])?, 1.0);
@@ -63,6 +67,7 @@ pub fn sample_variance(values: &[f64]) -> Result<f64, DomainError> {
 }
 
 /// The sum with two roundings, whatever its terms and their order.
+/// Who needs it: whoever adds up readings by hand: `gonio calc`.
 ///
 /// ```
 /// assert_eq!(radiometry::moments::sum(&[1e16, 1.0, -1e16])?, 1.0);
@@ -147,6 +152,7 @@ impl Spread {
 
 /// Weight, mean and sum of squared deviations so far; two of them merge into those of all readings
 /// together, in any grouping, to a rounding or two.
+/// Who needs it: partial results of several runs, merged.
 ///
 /// ```
 /// use radiometry::moments::Moments;

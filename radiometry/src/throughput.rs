@@ -9,6 +9,7 @@ use crate::quantity::{Area, FormFactor, Throughput};
 
 /// Two parallel disks with one axis, apart. A disk may have no radius: nothing passes, and seen from
 /// that point the form factor is the other's.
+/// Who needs it: the rig, whose detector it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "the unit stands last in the name")]
 pub struct CoaxialDisks {
@@ -18,6 +19,7 @@ pub struct CoaxialDisks {
 }
 
 /// How the throughput answers to its three lengths: first derivatives, m·sr.
+/// Who needs it: the rig, for the uncertainty of its throughput.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThroughputPartials {
     /// ∂T/∂r₁, not negative.
@@ -33,6 +35,7 @@ pub struct ThroughputPartials {
 ///
 /// Source: the disk-to-disk form factor (Howell, catalog C-41; Walsh), its difference of nearly
 /// equal terms rationalised: T = 2π² r₁² r₂² / (h² + r₁² + r₂² + q), q = √((r₁-r₂)²+h²) √((r₁+r₂)²+h²).
+/// Who needs it: the simulator, for its detector.
 ///
 /// ```
 /// use radiometry::throughput::coaxial_disks;

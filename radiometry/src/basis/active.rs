@@ -8,6 +8,7 @@ use crate::domain::DomainError;
 pub const DEGREE_MAX: usize = 15;
 
 /// The functions that are not zero around a place, in the order of their supports.
+/// Who needs it: rows of a fit's design matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Active {
     first: usize,

@@ -1,8 +1,8 @@
 //! B-splines over an interval or round a circle: piecewise polynomials that each live on a few knot
 //! spans only, so that a sample changes few coefficients and a sharp feature stays where it is.
 //!
-//! The fit needs them for fields too sharp for polynomials: over θ, x and y between given ends, over
-//! φ periodic, as products of one for each coordinate. They know nothing of samples or of fitting,
+//! For fits of fields too sharp for polynomials: over θ, x and y between given ends, over φ
+//! periodic, as products of one for each coordinate. They know nothing of samples or of fitting,
 //! nor what the coordinate means: x is in the unit of the knots, values are pure numbers,
 //! derivatives of order m per that unit to the m.
 //!
@@ -21,6 +21,7 @@ use crate::quadrature::gauss_legendre;
 /// Of degree p there are p + 1 non-zero ones at any place. At a knot that stands r times the
 /// p - r first derivatives are continuous; at one that stands p + 1 times there is a jump, and the
 /// value is that from the right (at the domain's end: from the left).
+/// Who needs it: fits of fields too sharp for polynomials (no caller in `fit` yet).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BSpline {
     degree: usize,

@@ -20,6 +20,7 @@ const DEGREE_MAX: usize = 10_000;
 /// The orthonormal amplitude √((2l+1)/(4π) · (l-m)!/(l+m)!) Pₗᵐ(cos θ), sr^-½, for 0 <= m <= l and
 /// θ in [0, π]: the harmonic without its azimuth. Good to 1e-13 of itself at l = 200; below the
 /// range of a double it is 0.
+/// Who needs it: the page on fields over the whole sphere; `gonio calc`.
 ///
 /// ```
 /// use radiometry::basis::harmonics::amplitude;
@@ -48,6 +49,7 @@ pub fn amplitude(l: usize, m: usize, theta_rad: f64) -> Result<f64, DomainError>
 
 /// All real harmonics up to a degree, orthonormal over the sphere under the solid angle:
 /// index l(l+1)+m, with √2 cos mφ for m > 0 and √2 sin |m|φ for m < 0. The first is 1/√(4π).
+/// Who needs it: the page on fields over the whole sphere (all light leaving an object).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SphericalHarmonics {
     degree: usize,
@@ -119,6 +121,7 @@ impl SphericalHarmonics {
 /// All real hemispherical harmonics up to a degree, orthonormal over the hemisphere under the
 /// solid angle: the spherical ones at cos θ' = 2 cos θ - 1, times √2 (Gautron, Křivánek, Pattanaik
 /// and Bouatouch 2004). Smooth inside, but every m > 0 has a kink of its slope at the pole's chart.
+/// Who needs it: the page on bases over the hemisphere, beside Zernike's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HemisphericalHarmonics(SphericalHarmonics);
 

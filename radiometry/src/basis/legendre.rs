@@ -6,6 +6,7 @@ use crate::domain::{DomainError, within};
 
 /// The Legendre polynomials of degree 0 to `degree`, each scaled by √(2k+1): P₀ = 1, and the mean
 /// of Pₖ² over [-1, 1] is 1 (of Pⱼ Pₖ: 0).
+/// Who needs it: the fit, for what varies over the sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Legendre {
     steps: Vec<Step>,
@@ -59,6 +60,7 @@ impl Legendre {
 /// Products of two Legendre polynomials over the square [-1, 1]², for what varies over the sample's
 /// area: √(2a+1) Pₐ(x) times its like of degree b in y, of limited total degree a + b. By total
 /// degree, then by b; the mean of a square over the square is 1, of a product of two different ones 0.
+/// Who needs it: fields over an area; the fit makes the same products of [`Legendre`] itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LegendreProducts(Legendre);
 
@@ -117,6 +119,7 @@ impl LegendreProducts {
 }
 
 /// The Legendre polynomial of a degree with P(1) = 1, at x in [-1, 1].
+/// Who needs it: the basis's tests and `gonio calc`.
 ///
 /// ```
 /// assert_eq!(radiometry::basis::legendre::polynomial(2, 0.5)?, -0.125);

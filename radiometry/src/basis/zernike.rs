@@ -15,6 +15,7 @@ use crate::domain::{DomainError, within};
 
 /// All Zernike polynomials up to a degree, in the order of ANSI Z80.28: j = (n(n+2)+m)/2, with
 /// cos mφ for m >= 0, sin |m|φ for m < 0.
+/// Who needs it: the fit, whose angular basis it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zernike {
     degree: usize,
@@ -129,6 +130,7 @@ impl Zernike {
 }
 
 /// (n, m) of the polynomial at place `j` in ANSI order.
+/// Who needs it: the fit, to name its coefficients.
 pub fn ansi_order(j: usize) -> (usize, i64) {
     // At most one off either way, whatever the square root's rounding.
     let mut n = (2 * j + 1).isqrt();
@@ -142,6 +144,7 @@ pub fn ansi_order(j: usize) -> (usize, i64) {
 
 /// The radial polynomial Rₙᵐ(r) with R(1) = 1, r in [0, 1]; n - m even and not negative, or 0 as
 /// by definition.
+/// Who needs it: the basis's tests and `gonio calc`.
 ///
 /// ```
 /// assert_eq!(radiometry::basis::zernike::radial(4, 2, 0.5)?, -0.5);

@@ -18,6 +18,7 @@ use crate::quantity::FormFactor;
 /// one acts by its left alone (going from its first edge to its second) and the part of the other on
 /// its right is left out, as if the strings were wrapped around its edge. The strips may touch; refused
 /// are strips that run through each other. A second strip without width receives nothing.
+/// Who needs it: the page on form factors (crossed strings).
 ///
 /// ```
 /// use glam::dvec2;
@@ -123,6 +124,7 @@ fn to_the_left(strip: [Vector; 2], other: [Vector; 2]) -> [Vector; 2] {
 
 /// Between two equal, parallel, infinite cylinders (Howell C-63): (√(X²-1) + asin(1/X) - X)/π with
 /// X = d/2r, d the distance of the axes, 2r at least; rationalised. 0 between lines.
+/// Who needs it: the page on form factors (crossed strings).
 ///
 /// ```
 /// // In contact: ½ - 1/π.

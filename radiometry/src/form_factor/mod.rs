@@ -7,8 +7,8 @@
 //! families C-1 and so on. Its closed forms cancel by the square to the fourth power of gap over size;
 //! the forms here do not, or give way to an integral that does not where they do.
 //!
-//! Who needs them: the simulator and the fit for the beam of a detector (disks), the person at the
-//! rig for baffles, enclosures and stray light.
+//! Who needs them: the page on form factors, and the person at the rig for baffles, enclosures and
+//! stray light. (The detector's beam is next door, in `throughput`.)
 
 mod contour;
 mod contour_wide;

@@ -27,6 +27,7 @@ const IN_PLANE: f64 = 4.0 * f64::EPSILON;
 /// other. Where that cancels, far apart, cubature of the positive kernel over pairs of triangles takes
 /// over; side by side, in thin gaps and at grazing sight, the same boundary integral in
 /// double-double.
+/// Who needs it: the person at the rig, for baffles and boxes.
 ///
 /// ```
 /// use glam::DVec3;
@@ -85,6 +86,7 @@ type Way = fn(&Facing, Tolerance) -> Result<Estimate, EstimateError>;
 
 /// Throughput of all rays from one polygon to another, m²·sr: π A₁ F₁₂; conventions as in
 /// [`polygons`].
+/// Who needs it: the page on the throughput of two surfaces.
 ///
 /// ```
 /// use glam::DVec3;

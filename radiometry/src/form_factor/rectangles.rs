@@ -25,6 +25,7 @@ fn kernel() -> Tolerance {
 
 /// Between two equal rectangles a x b, one right above the other at the distance c (Howell C-11). 0
 /// between lines.
+/// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
 /// // Opposite faces of a cube.
@@ -48,6 +49,7 @@ pub fn parallel_rectangles(
 
 /// From [x₁, x₂] x [y₁, y₂] in the plane 0 to [ξ₁, ξ₂] x [η₁, η₂] in the plane z, sides parallel (Howell
 /// C-13): the sum of 16 corner terms, or where they cancel the integral over v = η - y.
+/// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
 /// use radiometry::form_factor::aligned_rectangles;
@@ -85,6 +87,7 @@ pub fn aligned_rectangles(
 
 /// From the floor w x l to the wall h x l that stands on its edge l (Howell C-14). From the edge alone,
 /// a floor of no width, the wall fills half of the view.
+/// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
 /// // Faces of a cube with a common edge.
@@ -112,6 +115,7 @@ pub fn perpendicular_rectangles(
 /// From [x₁, x₂] x [y₁, y₂] in the plane z = 0 to y in [η₁, η₂], z in [z₁, z₂] in the plane x = 0 (Howell
 /// C-15); x₁ and z₁ not negative. The integral over v = η - y of
 /// ln(1 + (x₂²-x₁²)(z₂²-z₁²)/((x₁²+z₁²+v²)(x₂²+z₂²+v²)))/4π, as often as v occurs.
+/// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
 /// use radiometry::form_factor::{perpendicular_offset_rectangles, perpendicular_rectangles};
@@ -151,6 +155,7 @@ pub fn perpendicular_offset_rectangles(
 /// the edge, of the lines between the faces:
 /// ∫ sin β sin(φ+β) Q(R(β)) dβ/(π a sin φ), Q(R) = R atan(l/R) + (l/2) ln(1 + R²/l²), R the longest such
 /// line. Positive throughout. From the edge alone, a = 0, it is (1 + cos φ)/2.
+/// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::{perpendicular_rectangles, wedge_rectangles}};

@@ -12,6 +12,7 @@ use crate::throughput::CoaxialDisks;
 
 /// From disk 1 to disk 2, parallel and on one axis (Howell C-41); see
 /// [`CoaxialDisks::form_factor`]. A disk 1 of no radius is a point that looks along the axis.
+/// Who needs it: the page on form factors: stops that face each other.
 ///
 /// ```
 /// let factor = radiometry::form_factor::coaxial_disks(1.0, 1.0, 1.0)?;
@@ -30,6 +31,7 @@ pub fn coaxial_disks(
 /// from axis 2 of the factor of a point of disk 1, 2 r₂²h²/(B(B+A)) / 2 with A = h² + ρ² - r₂² and B
 /// the product of the slants to the nearest and the farthest rim point, over the arcs that disk 1
 /// has at ρ: positive throughout. A disk 1 of no radius is a point that looks along its axis.
+/// Who needs it: the page on form factors: stops that are misaligned.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::{coaxial_disks, parallel_disks}};
@@ -120,6 +122,7 @@ fn disk_from_point(rho: f64, radius: f64, distance: f64) -> f64 {
 /// From a sphere to a disk whose axis goes through the sphere's centre, that at the distance h >= r₁
 /// from the disk (Howell C-44 kind): r₂²/(2s(s + h)), s = √(h² + r₂²), whatever the sphere's radius,
 /// 0 included.
+/// Who needs it: the page on form factors: a bulb over a stop.
 ///
 /// ```
 /// // The half space: ½ for a huge disk.
@@ -144,6 +147,7 @@ pub fn sphere_disk(
 
 /// From the outer of two concentric spheres to the inner: (r₁/r₂)², r₁ <= r₂. What is left of 1
 /// meets the outer sphere itself.
+/// Who needs it: the page on form factors: a source in an integrating sphere.
 ///
 /// ```
 /// assert_eq!(radiometry::form_factor::concentric_spheres(1.0, 2.0)?.ratio(), 0.25);
@@ -162,6 +166,7 @@ pub fn concentric_spheres(
 /// lines: A₁F₁₂ = 2 ∫ sin γ S(d sin γ) dγ, S the area that the shadows of both spheres share along
 /// the directions at γ to the line of centres; positive throughout. From a sphere of no radius it is
 /// the part of all directions that sphere 2 takes up.
+/// Who needs it: the page on form factors.
 ///
 /// ```
 /// use radiometry::{Tolerance, form_factor::spheres};

@@ -9,6 +9,7 @@ use crate::domain::{self, DomainError, within};
 use crate::error_free::{DoubleDouble, cosine};
 
 /// The angle between a ray and the normal of the surface that it meets, in [0, π/2].
+/// Who needs it: every kernel of interfaces and windows.
 #[derive(Debug, Clone, Copy)]
 pub struct Incidence {
     cos: f64,

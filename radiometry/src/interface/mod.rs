@@ -2,10 +2,9 @@
 //! becomes of its radiance. It knows rays (geometrical optics), neither wavelength nor coherence;
 //! both indices are real, so that an interface alone absorbs nothing.
 //!
-//! The simulator needs it for windows and domes in front of a sample, the rig for the window of its
-//! detector. The formulas are those of Born and Wolf (1999, sections 1.5.1 to 1.5.4), with each
-//! difference of nearly equal terms rationalised: with p = n₁ cos θ₁, q = n₂ cos θ₂ and
-//! D = n₂² - n₁² there is q² = p² + D, and q - p = D/(p + q). So nothing is lost at grazing
+//! The simulator needs it for windows and domes in front of a sample. The formulas are those of Born
+//! and Wolf (1999, sections 1.5.1 to 1.5.4), with each difference of nearly equal terms
+//! rationalised: with p = n₁ cos θ₁, q = n₂ cos θ₂ and D = n₂² - n₁² there is q² = p² + D, and q - p = D/(p + q). So nothing is lost at grazing
 //! incidence, next to the critical angle, or where the indices hardly differ.
 //!
 //! ```
@@ -34,6 +33,7 @@ pub use incidence::Incidence;
 pub use window::Window;
 
 /// The plane between medium 1, where the light comes from, and medium 2.
+/// Who needs it: the simulator, for windows and domes; the page on the n² law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interface {
     /// Both in one scale, the larger in [1, 2): only their ratio has a meaning.
@@ -244,6 +244,7 @@ impl Passage {
 /// length on the side that the ray comes from: d - 2 (d·n) n. The solid angle and the cosine to the
 /// normal stay, and so does the throughput of a beam. A direction that leads away from the
 /// interface is an error, and so are vectors without a direction.
+/// Who needs it: the page on throughput at a mirror.
 ///
 /// ```
 /// use glam::DVec3;

@@ -6,8 +6,7 @@ use crate::domain::{DomainError, not_negative};
 
 use super::{Incidence, Interface};
 
-/// A plate of medium 2 with medium 1 on both sides. The simulator puts it in front of a sample; the
-/// rig may look through one.
+/// A plate of medium 2 with medium 1 on both sides. The simulator puts it in front of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     face: Interface,

@@ -44,6 +44,7 @@ pub fn disk(receiver: &Receiver, disk: &Disk) -> Result<ProjectedSolidAngle, Dom
 /// Projected solid angle of a disk parallel to the receiver, `distance_m` above it, its axis
 /// `offset_m` aside: 2π r² h²/(B (B + A)), A = h² + o² - r², B the nearest times the farthest
 /// distance of the rim (Howell B-12). A receiver that touches the disk sees π.
+/// Who needs it: the page on projected solid angle: a lamp over a bench.
 ///
 /// ```
 /// use radiometry::projected::disk_parallel;
@@ -74,6 +75,7 @@ pub fn disk_parallel(
 /// Projected solid angle of a disk whose axis goes through the receiver, the receiver's normal at
 /// `normal_angle_rad` in [0, π] to the direction of the disk's centre (Howell B-13 where the horizon
 /// cuts it).
+/// Who needs it: the page on projected solid angle: the pupil seen from a tilted sample.
 ///
 /// ```
 /// use radiometry::projected::disk_tilted;

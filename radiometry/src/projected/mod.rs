@@ -3,7 +3,8 @@
 //! receiver's horizon is cut off. Both faces of a flat source emit.
 //!
 //! Closed forms where they keep their digits; where they cancel, the same positive integrand by Gauss
-//! quadrature. It knows no radiance and no rig.
+//! quadrature. It knows no radiance and no rig. For the pages on projected solid angle, Lambert's
+//! formula, umbra and penumbra, and for `irradiance` next door.
 
 mod body;
 mod disk;
@@ -35,6 +36,7 @@ pub use shadow::{Region, RegionShadow, Shadow, region_shadow, shadow};
 pub use sphere::{sphere, sphere_tilted};
 
 /// A point with the normal of the surface that it belongs to.
+/// Who needs it: every kernel here.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Receiver {
     point_m: DVec3,

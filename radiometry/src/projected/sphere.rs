@@ -17,6 +17,7 @@ const CANCELLATION: f64 = 32.0;
 /// where all of it is above the horizon. Cut by it: the classic factor between an element and a
 /// sphere (Howell, Catalog of configuration factors, section B), and where that cancels its integral
 /// over elevation. A receiver inside is refused. Sim: a spherical source; the Sun.
+/// Who needs it: the page on projected solid angle: the Sun at the horizon.
 ///
 /// ```
 /// use glam::DVec3;
@@ -38,6 +39,7 @@ pub fn sphere(receiver: &Receiver, sphere: &Sphere) -> Result<ProjectedSolidAngl
 
 /// The same from the sphere's radius, the distance of its centre and the angle in [0, π] between the
 /// receiver's normal and the direction to the centre.
+/// Who needs it: the page on projected solid angle: the Sun at the horizon.
 ///
 /// ```
 /// use radiometry::projected::sphere_tilted;

@@ -153,6 +153,7 @@ impl Piece {
 ///
 /// Smooth integrands take 21 evaluations; one with a singularity at an end or at a point of
 /// [`adaptive_between`] converges as well (each halving costs 42), as long as it is integrable.
+/// Who needs it: what is seen past an occluder's rim; curved rays, with a bound of their rounding.
 ///
 /// ```
 /// use radiometry::{Tolerance, quadrature::adaptive};
@@ -173,6 +174,7 @@ pub fn adaptive(
 
 /// ∫ f from the first to the last of the points, broken at each: where f has a kink or a peak, a
 /// point there saves the search for it. The integrand is never evaluated at a point itself.
+/// Who needs it: the simulator, for the exitance of a lobe.
 ///
 /// ```
 /// use radiometry::{Tolerance, quadrature::adaptive_between};

@@ -30,6 +30,7 @@ const STUDENT: f64 = 3.633;
 const FIRST_ROUND: usize = 64;
 
 /// Sobol's sequence (1967) in Gray code order (Antonov and Saleev 1979), in `D` dimensions.
+/// Who needs it: [`quasi_monte_carlo`].
 #[derive(Debug, Clone)]
 pub struct Sobol<const D: usize> {
     directions: [[u32; BITS]; D],
@@ -102,6 +103,7 @@ fn shifted(coordinate: u32, shift: u64) -> f64 {
 ///
 /// It is for integrands that cubature does not reach: more than two dimensions, or steps (visibility).
 /// The error falls about as 1/n for smooth ones, n^(-3/4) for steps in two dimensions.
+/// Who needs it: the page on what accuracy costs; the tests of closed forms.
 ///
 /// ```
 /// use radiometry::{Tolerance, quadrature::quasi_monte_carlo};

@@ -1,7 +1,7 @@
 //! Rays against surfaces: where a ray first meets a plane, sphere, disk, triangle, polygon or
 //! cylinder, and how often it meets a mesh. Edges and tangents count as hits. It knows no light.
 //!
-//! Occlusion and the simulator's scenes need it. The traps are far origins (the coordinates'
+//! For visibility between places of a scene. The traps are far origins (the coordinates'
 //! difference has to be exact), tangents (b² - ac has no digit left) and edges that two triangles
 //! share (rounding lets a ray slip between or hits twice). Here every difference of coordinates
 //! is kept exactly, and every decision is the sign of a polynomial of the given doubles, which is
@@ -30,6 +30,7 @@ use crate::error_free::two_sum;
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
 /// A half-line from an origin, metres, along a direction of any length.
+/// Who needs it: whoever asks what a ray meets first: `gonio calc`, the page on visibility.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     origin: DVec3,

@@ -10,6 +10,7 @@ use crate::domain::{DomainError, direction, finite, finite_vector, not_negative}
 pub use polygon::Polygon;
 
 /// A flat circular disk; both faces are alike.
+/// Who needs it: sources and occluders here; the simulator's scenes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disk {
     center_m: DVec3,
@@ -44,6 +45,7 @@ impl Disk {
 }
 
 /// A ball with its surface.
+/// Who needs it: sources and occluders here; the simulator's scenes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
     center_m: DVec3,
@@ -71,6 +73,7 @@ impl Sphere {
 }
 
 /// A horizontal half-plane: all points at height `z_m` with x <= `x_max_m`. A knife edge.
+/// Who needs it: occluders here; the simulator's scenes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfPlane {
     x_max_m: f64,

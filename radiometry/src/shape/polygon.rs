@@ -11,6 +11,7 @@ use crate::wide::{cross, in_units, length, unit_exponent};
 const OFF_PLANE: f64 = 1e-6;
 
 /// A flat polygon without holes, convex or not, vertices in order (either sense), both faces alike.
+/// Who needs it: sources and occluders here; the simulator's outlines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     vertices_m: Vec<DVec3>,

@@ -46,6 +46,7 @@ pub fn disk_off_axis(
 }
 
 /// Solid angle of a disk in any position, seen from `point`; as [`disk_off_axis`].
+/// Who needs it: as [`disk_off_axis`].
 ///
 /// ```
 /// use glam::DVec3;

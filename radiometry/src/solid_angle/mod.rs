@@ -1,6 +1,7 @@
 //! Solid angle of cones, rings, disks, spheres, triangles and polygons, and the projected solid angle
 //! of a cone about the receiver's normal. Written without the difference 1 - cos, which has no digits
-//! left for small cones. Orientation of the receiver beyond that is the room next door, `projected`.
+//! left for small cones. Orientation of the receiver beyond that is the room next door, `projected`. For
+//! the page on solid angle, and whatever here is seen under one.
 
 mod disk;
 mod elliptic;
@@ -18,6 +19,7 @@ pub use triangle::{polygon, triangle, triangle_signed};
 const WHOLE_SPHERE: f64 = 4.0 * PI;
 
 /// Solid angle of a cone: 4π sin²(h/2), h the half angle in [0, π].
+/// Who needs it: the page on solid angle.
 ///
 /// ```
 /// use radiometry::solid_angle::cone;
@@ -32,6 +34,7 @@ pub fn cone(half_angle_rad: f64) -> Result<SolidAngle, DomainError> {
 
 /// Projected solid angle of a cone about the receiver's normal: π sin² h; the hemisphere's π from
 /// h = π/2 on, since the horizon cuts the rest off.
+/// Who needs it: the page on projected solid angle: π sin² h.
 ///
 /// ```
 /// use radiometry::solid_angle::cone_projected;
@@ -46,6 +49,7 @@ pub fn cone_projected(half_angle_rad: f64) -> Result<ProjectedSolidAngle, Domain
 }
 
 /// Half angle of the cone of a solid angle in [0, 4π] sr: 2 asin √(Ω/4π).
+/// Who needs it: the page on solid angle: how wide a source of so many steradians is.
 ///
 /// ```
 /// use radiometry::{quantity::SolidAngle, solid_angle::cone_half_angle};
@@ -60,6 +64,7 @@ pub fn cone_half_angle(solid_angle: SolidAngle) -> Result<f64, DomainError> {
 
 /// Solid angle between two cones about one axis: 4π sin((a+b)/2) sin((b-a)/2), half angles
 /// 0 <= a <= b <= π.
+/// Who needs it: the page on solid angle: zones of a goniometer.
 ///
 /// ```
 /// use radiometry::solid_angle::annulus;
@@ -78,6 +83,7 @@ pub fn annulus(inner_rad: f64, outer_rad: f64) -> Result<SolidAngle, DomainError
 /// Solid angle of a disk seen from its axis: 2π r²/(s(s+d)), s = √(r²+d²). A disk of no radius
 /// has none, from any distance; one touched by the receiver fills the hemisphere. From beside the
 /// axis: [`disk_off_axis`].
+/// Who needs it: the page on solid angle: a pupil from its axis.
 ///
 /// ```
 /// use radiometry::solid_angle::disk;
@@ -100,6 +106,7 @@ pub fn disk(radius_m: f64, distance_m: f64) -> Result<SolidAngle, DomainError> {
 /// Solid angle of a sphere from a point at `distance_m` from its centre, on its surface or outside:
 /// 4π sin²(σ/2) = 2π (r/d)²/(1 + cos σ) with cos σ = √((d-r)(d+r))/d. 2π on the surface; from inside,
 /// which is refused, it would be all directions.
+/// Who needs it: the page on solid angle: the Sun.
 ///
 /// ```
 /// use radiometry::solid_angle::sphere;

@@ -47,6 +47,7 @@ pub fn triangle_signed(
 
 /// Solid angle of the triangle (a, b, c) seen from the origin, without a sign; 2π, the limit from
 /// either side, if the origin lies inside it. See [`triangle_signed`].
+/// Who needs it: the page on solid angle; triangle meshes.
 ///
 /// ```
 /// use glam::DVec3;
@@ -65,6 +66,7 @@ pub fn triangle(a: DVec3, b: DVec3, c: DVec3) -> Result<SolidAngle, DomainError>
 
 /// Solid angle of a polygon, convex or not, seen from `point`: the signed triangles of a fan. Zero
 /// from its plane outside it; up to 2π near its face.
+/// Who needs it: the page on solid angle: faces of a room.
 ///
 /// ```
 /// use glam::DVec3;

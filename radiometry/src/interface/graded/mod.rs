@@ -31,6 +31,7 @@ fn checked_index(index: f64) -> Result<f64, DomainError> {
 
 /// Basic radiance L/n², W·m⁻²·sr⁻¹: what a ray carries unchanged through every lossless medium and
 /// interface (Nicodemus 1963; Clausius 1864 for black-body light). n in 1 to 1000.
+/// Who needs it: the page on the n² law.
 ///
 /// ```
 /// use radiometry::interface::basic_radiance;
@@ -46,6 +47,7 @@ pub fn basic_radiance(radiance: Radiance, index: f64) -> Result<Radiance, Domain
 
 /// The other way: n² times the basic radiance, which is what a detector within the medium would
 /// measure.
+/// Who needs it: the page on the n² law.
 ///
 /// ```
 /// use radiometry::interface::radiance_in_medium;

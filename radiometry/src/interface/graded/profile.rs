@@ -6,6 +6,7 @@ use super::checked_index;
 
 /// The index at every level: a height over plane layers, or the distance from the centre of spherical
 /// ones. Any `Fn(f64) -> f64` is one.
+/// Who needs it: [`Stratified`](super::Stratified).
 pub trait IndexProfile {
     /// n at a level, m.
     fn index(&self, level_m: f64) -> f64;
@@ -25,6 +26,7 @@ impl<F: Fn(f64) -> f64> IndexProfile for F {
 }
 
 /// n₀ + g z: air over a hot road, a salt solution that settles. Rays are catenaries.
+/// Who needs it: the page on curved rays: mirage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearProfile {
     at_zero: f64,
@@ -53,6 +55,7 @@ impl IndexProfile for LinearProfile {
 }
 
 /// 1 + N exp(-(z - z₀)/H): an isothermal atmosphere of refractivity N at the level z₀.
+/// Who needs it: the page on curved rays: atmosphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExponentialProfile {
     refractivity: f64,

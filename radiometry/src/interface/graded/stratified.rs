@@ -20,6 +20,7 @@ use super::checked_index;
 use super::profile::IndexProfile;
 
 /// A medium in layers of equal index.
+/// Who needs it: the page on radiance along curved rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stratified<P> {
     profile: P,

@@ -101,6 +101,7 @@ pub enum TraceError {
 /// may be overlooked: no step is longer than a 32nd of it. A plane that is touched
 /// and not crossed, or crossed twice within a step, is not met. The field has to go on a little beyond
 /// the stop, where a last step may end.
+/// Who needs it: the page on radiance along curved rays: gradient lenses, any field.
 ///
 /// ```
 /// use glam::DVec3;
