@@ -6,6 +6,8 @@
 //! as everywhere. For lit samples in the simulator, and the lecture's page on environment maps: the
 //! two-dimensional chart (θ, φ) with dΩ̃ = cos θ dω at a point.
 
+mod equal_area;
+mod folded;
 mod horizon;
 mod lat_long;
 
@@ -14,6 +16,7 @@ use core::fmt;
 use crate::domain::DomainError;
 use crate::quantity::{Radiance, Weighting};
 
+pub use equal_area::EqualArea;
 pub use lat_long::LatLong;
 
 /// Pixels that a map may have: more is taken for a mistake.
@@ -28,6 +31,11 @@ pub enum EnvironmentError {
         rows: usize,
         /// As given.
         columns: usize,
+    },
+    /// An equal-area map's side that no axis halves.
+    Odd {
+        /// In pixels.
+        side: usize,
     },
     /// Another number of radiances than pixels.
     Count {
@@ -53,6 +61,9 @@ impl fmt::Display for EnvironmentError {
                 "the map has {rows} rows and {columns} columns, expected 1 or more and at most \
                  {PIXELS_MAX} pixels"
             ),
+            Self::Odd { side } => {
+                write!(f, "the map has {side} pixels on a side, expected an even number")
+            }
             Self::Count { found, expected } => {
                 write!(f, "the map has {found} radiances, expected {expected}, one for each pixel")
             }
