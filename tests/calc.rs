@@ -258,6 +258,9 @@ fn light_has_the_values_of_the_closed_forms() {
     near("irradiance-from-environment", environment([1.0, 2.0, 0.0]), &[50.0 * PI]);
     // The view factor of the sky: (1 + cos θ)/2.
     near("irradiance-from-environment", environment([3.0, 0.0, 4.0]), &[90.0 * PI]);
+    let square = json!([[7.0, 7.0], [7.0, 7.0]]);
+    let square = json!({"normal": [1, 2, 3], "map": square, "pixels": "equal-area"});
+    near("irradiance-from-environment", square, &[7.0 * PI]);
     near("environment-radiance", json!({"direction": [0, 1, -0.1], "map": sky}), &[0.0]);
     near("irradiance-from-sun", json!({"normal_angle": 0}), &[1353.0]);
     near("irradiance-from-sun", json!({"normal_angle": PI / 3.0}), &[676.5]);
@@ -296,6 +299,11 @@ fn light_without_meaning_is_refused() {
     refused("irradiance-from-environment", map(json!([[1, 2], [3]])), "row 1");
     refused("irradiance-from-environment", map(json!([])), "0 rows");
     refused("irradiance-from-environment", map(json!([[], []])), "0 columns");
+    let equal_area = |map: Value| json!({"normal": [0, 0, 1], "map": map, "pixels": "equal-area"});
+    refused("irradiance-from-environment", equal_area(json!([[1, 2]])), "square");
+    refused("irradiance-from-environment", equal_area(json!([[1]])), "even");
+    let unknown = json!({"normal": [0, 0, 1], "map": [[1]], "pixels": "cube"});
+    refused("irradiance-from-environment", unknown, "cube");
     refused("irradiance-from-sun", json!({"normal_angle": 4}), "normal_angle");
     refused("irradiance-from-sun", json!({"normal_angle": 0, "distance": 1}), "sphere");
     refused("sun-radiance", json!({"distance": -1}), "distance");

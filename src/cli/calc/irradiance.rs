@@ -1,7 +1,7 @@
 //! Irradiance from uniform sources, from an environment map and from the Sun.
 
 use glam::DVec3;
-use radiometry::environment::LatLong;
+use radiometry::environment::{EnvironmentError, EqualArea, LatLong};
 use radiometry::irradiance::{self, Sun};
 use radiometry::quantity::Radiance;
 use radiometry::shape::Polygon;
@@ -17,10 +17,12 @@ const POINT: Input = Input::new("point", "x,y,z of the receiver, m");
 const NORMAL: Input = Input::new("normal", "the receiver's, x,y,z of any length");
 const CENTER: Input = Input::new("center", "x,y,z, m");
 const RADIUS: Input = Input::new("radius", "m");
-const MAP: Input = Input::new(
-    "map",
-    "list of rows of W/(m² sr), all as long; rows from θ = 0 (+z) to π, each from φ = 0 (+x) \
-     once round over +y",
+const MAP: Input = Input::new("map", "list of rows of W/(m² sr), all as long");
+const PIXELS: Input = Input::optional(
+    "pixels",
+    "lat-long (default): equal steps, rows from θ = 0 (+z) to π, each from φ = 0 (+x) once round \
+     over +y; equal-area: Clarberg's octahedral square, rows towards +y, columns towards +x, +z in \
+     the middle",
 );
 const DISTANCE: Input = Input::optional(
     "distance",
@@ -126,21 +128,32 @@ pub(super) const QUANTITIES: &[Quantity] = &[
     },
     Quantity {
         name: "irradiance-from-environment",
-        inputs: &[NORMAL, MAP],
+        inputs: &[NORMAL, MAP, PIXELS, Input::optional("relative_tolerance", "default 1e-10")],
         unit: IRRADIANCE,
-        example: "--normal 1,0,1 --map [[100,100,100,100],[50,80,50,50],[10,10,10,10]]",
+        example: "--normal 1,0,1 --map [[100,100,100,100],[50,80,50,50],[10,10,10,10]] \
+                  --pixels lat-long",
         rounding: Rounding::Stated,
-        compute: |inputs| Ok(map(inputs)?.irradiance(inputs.direction("normal")?)?.into()),
+        compute: |inputs| {
+            let normal = inputs.direction("normal")?;
+            Ok(match map(inputs)? {
+                Map::LatLong(map) => map.irradiance(normal)?.into(),
+                Map::EqualArea(map) => map.irradiance(normal, tolerance(inputs)?)?.into(),
+            })
+        },
     },
     Quantity {
         name: "environment-radiance",
-        inputs: &[Input::new("direction", "towards the light, x,y,z of any length"), MAP],
+        inputs: &[Input::new("direction", "towards the light, x,y,z of any length"), MAP, PIXELS],
         unit: "W/(m² sr)",
         example: "--direction 0,1,0.1 --map [[100,100,100,100],[50,80,50,50],[10,10,10,10]]",
         rounding: Rounding::Absolute(0.0),
         compute: |inputs| {
             let towards: DVec3 = inputs.direction("direction")?;
-            Ok(map(inputs)?.radiance(towards)?.w_per_m2_sr().into())
+            let radiance = match map(inputs)? {
+                Map::LatLong(map) => map.radiance(towards)?,
+                Map::EqualArea(map) => map.radiance(towards)?,
+            };
+            Ok(radiance.w_per_m2_sr().into())
         },
     },
     Quantity {
@@ -177,7 +190,19 @@ fn sun(inputs: Inputs<'_>) -> Result<Sun, Refusal> {
     }
 }
 
-fn map(inputs: Inputs<'_>) -> Result<LatLong, Refusal> {
+/// An environment map.
+enum Map {
+    LatLong(LatLong),
+    EqualArea(EqualArea),
+}
+
+impl From<EnvironmentError> for Refusal {
+    fn from(error: EnvironmentError) -> Self {
+        Self::new(format!("map: {error}"))
+    }
+}
+
+fn map(inputs: Inputs<'_>) -> Result<Map, Refusal> {
     let rows = inputs.columns("map")?;
     let columns = rows.first().map_or(0, Vec::len);
     if let Some((row, found)) = rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
@@ -187,6 +212,14 @@ fn map(inputs: Inputs<'_>) -> Result<LatLong, Refusal> {
         )));
     }
     let radiances: Vec<_> = rows.iter().flatten().map(|l| Radiance::from_w_per_m2_sr(*l)).collect();
-    LatLong::new(rows.len(), columns, &radiances)
-        .map_err(|error| Refusal::new(format!("map: {error}")))
+    let pixels = if inputs.has("pixels") { inputs.text("pixels")? } else { "lat-long" };
+    match pixels {
+        "lat-long" => Ok(Map::LatLong(LatLong::new(rows.len(), columns, &radiances)?)),
+        "equal-area" if rows.len() != columns => Err(Refusal::new(format!(
+            "map has {} rows of {columns}, expected a square of equal-area pixels",
+            rows.len()
+        ))),
+        "equal-area" => Ok(Map::EqualArea(EqualArea::new(columns, &radiances)?)),
+        other => Err(Refusal::new(format!("pixels is `{other}`, expected lat-long or equal-area"))),
+    }
 }

@@ -126,7 +126,11 @@ fn read_value(text: &str) -> Option<Value> {
     if text.contains(',') {
         return text.split(',').map(number).collect::<Option<Vec<_>>>().map(Value::from);
     }
-    number(text)
+    // A word; `inf` and `nan` are numbers, if no finite ones.
+    let is_word = text.starts_with(|c: char| c.is_ascii_lowercase())
+        && text.chars().all(|c| c.is_ascii_lowercase() || c == '-')
+        && text.parse::<f64>().is_err();
+    if is_word { Some(text.into()) } else { number(text) }
 }
 
 fn list(is_json: bool) -> Result<(), Failure> {
@@ -175,6 +179,8 @@ mod tests {
             Value::from(read),
             json!({"a": 1e-3, "b": -0.5, "half_angle": 0.5, "v": [1.0, 2.0, -3.0]})
         );
+        let read = read_words(&words("--pixels equal-area")).unwrap();
+        assert_eq!(Value::from(read), json!({"pixels": "equal-area"}));
         for wrong in ["--a", "a 1", "--a NaN", "--a inf", "--a 1 --a 2", "--a 1,x"] {
             assert!(read_words(&words(wrong)).is_err(), "{wrong}");
         }
