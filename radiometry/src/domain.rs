@@ -143,6 +143,10 @@ impl fmt::Display for DomainError {
                 write!(f, "{result} has no digits at arguments so far apart in size")
             }
             Self::Overflow { result } => write!(f, "{result} is beyond the largest double"),
+            // The largest double stands for no limit.
+            Self::Outside { argument, value, low, high: f64::MAX } => {
+                write!(f, "{argument} is {value}, expected {low} or more")
+            }
             Self::Outside { argument, value, low, high } => {
                 write!(f, "{argument} is {value}, expected {low} to {high}")
             }

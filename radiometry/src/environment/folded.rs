@@ -60,7 +60,7 @@ impl Pixel {
     /// Its two halves on either side of its diagonal a + b.
     pub(super) fn triangles(&self, half: usize) -> [Triangle; 2] {
         let on = |index: usize| index as f64 / half as f64;
-        let upper = self.i + self.j + 1 <= half;
+        let upper = self.i + self.j < half;
         // One that the equator halves has two like halves.
         let is_halved = self.i + self.j + 1 == half;
         let (i, j) = if upper { (self.i, self.j) } else { (half - 1 - self.j, half - 1 - self.i) };
