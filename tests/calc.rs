@@ -184,12 +184,9 @@ fn a_radius_of_zero_has_a_value() {
     }
 }
 
-/// Integrals: at such sizes one may spend its whole budget, which takes minutes unoptimised.
+/// Form factors: at such sizes one may spend its whole budget, which takes minutes unoptimised.
 fn is_integrated(name: &str) -> bool {
-    name.starts_with("occluded")
-        || name.starts_with("form-factor")
-        || name.contains("disk-projected")
-        || name.ends_with("of-disk")
+    name.starts_with("form-factor")
 }
 
 #[test]
