@@ -3,7 +3,7 @@
 //!
 //! The two disks are the entrance pupil and the field stop's image (the spot, at the stated distance
 //! across the axis), or the two apertures of a tube. It does not know where the beam points, nor what
-//! the rays meet.
+//! the rays meet. For the page on the spot detector and whoever averages a field over its footprint.
 //!
 //! Frame of a beam: the axis is +z towards the detector; the origin is the point of the axis at
 //! which the detector looks. Lengths in metres.
