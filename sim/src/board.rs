@@ -7,7 +7,7 @@ use firmware_protocol::{AxisIdentity, Board, BoardFault, Illumination, Instant, 
 
 use crate::Compiled;
 use crate::chance::mix;
-use crate::mechanics::{Axis, SeenRay, forward};
+use crate::mechanics::{Axis, SeenRay};
 use crate::optics;
 use crate::stage::Stages;
 use crate::time::Interval;
@@ -75,7 +75,7 @@ impl SimulatedBoard {
     }
 
     fn detector_axis(&self, now: Instant) -> optics::Axis {
-        forward(core::array::from_fn(|axis| self.axes[axis].value(now)))
+        self.compiled.kinematics.seen(core::array::from_fn(|axis| self.axes[axis].value(now)))
     }
 
     fn axis(&mut self, channel: u8) -> Option<&mut Axis> {

@@ -15,7 +15,7 @@ use crate::check::check;
 use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
 use crate::field::Field;
-use crate::mechanics::{self, AxisTruth};
+use crate::mechanics::{self, AxisTruth, Kinematics};
 use crate::optics::{self, Optics};
 use crate::stage::Stages;
 use crate::time;
@@ -29,6 +29,7 @@ pub struct Compiled {
     pub(crate) simulated: Simulated,
     pub(crate) seed: u64,
     pub(crate) axes: [AxisTruth; 4],
+    pub(crate) kinematics: Arc<dyn Kinematics>,
     pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
     pub(crate) current_per_radiance: f64,
@@ -134,6 +135,7 @@ pub fn compile(
         responsivity,
         amplifier: draw_amplifier(&departing, terms.seed)?,
         axes: mechanics::axes(&nominal, &simulated, terms.seed, &chosen),
+        kinematics: mechanics::kinematics(&simulated, terms.seed, &chosen),
         scene,
         nominal,
         simulated,

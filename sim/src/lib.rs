@@ -36,7 +36,9 @@ pub use compile::{CompileError, Compiled, compile};
 pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use field::Ray;
-pub use mechanics::SeenRay;
+pub use mechanics::{
+    AxisFlaws, EncoderError, Misalignment, MissedSteps, Ringing, SeenRay, Uncertain,
+};
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use optics::Axis;
 pub use pty::Pty;

@@ -333,14 +333,20 @@ fn a_rig_holds_what_is_called_for_and_says_why() {
     rig.detector.read_noise_a = 2e-13;
     rig.detector.gains[0].u_relative = 5e-4;
     rig.axes[0].u_zero = 3e-4;
+    rig.axes[2].u_zero = 3e-4;
     let full = compiled(lambertian(1.0), rig, 1);
     let bound = |name: &str| row(&full, name).bound.expect("a bound").value;
-    assert!(["read-noise", "theta-zero", "gain[0]"].iter().all(|name| row(&full, name).included));
+    assert!(["read-noise", "x-zero", "gain[0]"].iter().all(|name| row(&full, name).included));
     // The mean of a dwell's hundred ADC readings, beside the smallest signal or half of it.
     let read_noise = 2e-14 / bare.current_per_radiance();
     assert!((1.0..2.001).contains(&(bound("read-noise") / read_noise)), "{}", bound("read-noise"));
     assert!((bound("gain[0]") / 5e-4 - 1.0).abs() < 1e-12);
-    assert_eq!(bound("theta-zero").to_bits(), 3e-4_f64.to_bits());
+    // On an even patch no direction matters, but places at its outline do.
+    assert!(!row(&full, "theta-zero").included && row(&full, "theta-zero").cause.is_some());
+    assert_eq!(
+        [bound("theta-zero"), bound("x-zero")].map(f64::to_bits),
+        [0.0, 1.0_f64].map(f64::to_bits)
+    );
     let names: std::collections::BTreeSet<_> = full.effects().iter().map(|row| &row.name).collect();
     assert_eq!(names.len(), full.effects().len(), "no effect twice");
 }

@@ -1,17 +1,30 @@
 //! What the mechanics bring to the compiler: an effect for each way in which an axis is not where
-//! it is thought to be.
+//! it is thought to be, or does not meet the others as it should.
 
+use std::sync::Arc;
+
+use super::flaws::{
+    AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, MISSED_STEPS, MissedSteps, NON_ORTHOGONALITY,
+    Ringing, SETTLE_RINGING, WOBBLE,
+};
+use super::geometry::{Kinematics, Misaligned, Perfect};
+use super::ringing::Rings;
+use super::weigh::{Departing, Joints, Trials};
+use super::{AxisTruth, Misalignment, Uncertain};
 use crate::compile::Setting;
 use crate::effect::{Bound, BoundUnit, Candidate, Chosen, Influence};
-use crate::mechanics::AxisTruth;
+use crate::optics::Axis;
 use crate::simulated::AXIS_NAMES;
 use crate::{Nominal, NominalAxis, Simulated};
 
-/// The axes' candidates, and the limit switches'.
+/// ADC readings of a dwell that a ringing axis is tried at, at most.
+const RINGING_TRIALS: u32 = 64;
+
+/// The axes' candidates, those of how they meet, and the limit switches'.
 pub(crate) fn candidates(setting: &Setting<'_>) -> Vec<Candidate> {
-    let axes = AXIS_NAMES.iter().zip(&setting.nominal.axes).enumerate();
-    let mut candidates: Vec<Candidate> =
-        axes.flat_map(|(i, (name, axis))| of_axis(name, axis, i < 2)).collect();
+    let weighing = Weighing { setting, trials: core::cell::OnceCell::new() };
+    let mut candidates: Vec<Candidate> = (0..4).flat_map(|i| weighing.of_axis(i)).collect();
+    candidates.extend(weighing.of_misalignment());
     let margin = setting.simulated.limit_margin;
     candidates.push(Candidate::of_key(
         "limit-switches",
@@ -43,50 +56,234 @@ pub(crate) fn axes(
                 *value = 0.0;
             }
         }
-        AxisTruth::draw(name, &axis, simulated.start[i], simulated.limit_margin, seed)
+        let flaws = simulated.axes[i].chosen(name, |effect| chosen.has(effect));
+        AxisTruth::draw(name, &axis, &flaws, simulated.start[i], simulated.limit_margin, seed)
     })
 }
 
-fn of_axis(name: &str, axis: &NominalAxis, is_angle: bool) -> Vec<Candidate> {
-    let (unit, key, per_key) = if is_angle {
+/// How the axes meet, with what was chosen of that.
+pub(crate) fn kinematics(simulated: &Simulated, seed: u64, chosen: &Chosen) -> Arc<dyn Kinematics> {
+    let drawn = simulated.misalignment.drawn(seed, |effect| chosen.has(effect));
+    if drawn == Misaligned::default() { Arc::new(Perfect) } else { Arc::new(drawn) }
+}
+
+/// The poses are put together when the first effect asks for them.
+struct Weighing<'s> {
+    setting: &'s Setting<'s>,
+    trials: core::cell::OnceCell<Trials<'s>>,
+}
+
+impl Weighing<'_> {
+    fn largest(&self, errors: &[Departing<'_>]) -> Influence {
+        let trials = self.trials.get_or_init(|| Trials::new(self.setting));
+        Influence::Relative(trials.largest(errors))
+    }
+
+    /// Of an axis that is off by so much, either way.
+    fn off(&self, axis: usize, by: f64) -> Influence {
+        let moved = |mut joints: Joints, by: f64| {
+            joints[axis] += by;
+            vec![Perfect.seen(joints)]
+        };
+        self.largest(&[&|joints| moved(joints, by), &|joints| moved(joints, -by)])
+    }
+
+    fn of_axis(&self, i: usize) -> Vec<Candidate> {
+        let mut candidates = self.as_stated(i);
+        candidates.extend(self.flaws(i));
+        candidates
+    }
+
+    /// What the rig file states of an axis.
+    fn as_stated(&self, i: usize) -> Vec<Candidate> {
+        let (name, axis) = (AXIS_NAMES[i], &self.setting.nominal.axes[i]);
+        let (unit, key, per_key) = units(i);
+        let drawn = |what: &str, key_name: &str, u: f64, how: &str| {
+            let cause = format!("axes.{name}.{key_name}_{key} = {}", u * per_key);
+            let influence = if u > 0.0 { self.off(i, u) } else { Influence::Relative(0.0) };
+            Candidate::of_key(format!("{name}-{what}"), &cause, u > 0.0, influence, how)
+        };
+        let resolution = Bound { value: 0.5 / axis.counts_per_unit.abs(), unit };
+        let rounded = if axis.has_encoder {
+            "the position, rounded to a count"
+        } else {
+            "the setpoint, rounded to a count"
+        };
+        let lag = AxisTruth::lag_units_max(axis);
+        vec![
+            drawn(
+                "zero",
+                "u_zero",
+                axis.u_zero,
+                "where the home mark stands, drawn once by the seed",
+            ),
+            drawn(
+                "homing",
+                "u_homing",
+                axis.u_homing,
+                "drawn at each homing of a boot, by its number",
+            ),
+            drawn(
+                "scale",
+                "u_readback",
+                axis.u_readback,
+                "drawn for each count of the scale by the seed",
+            ),
+            Candidate::of_key(
+                format!("{name}-resolution"),
+                &format!("axes.{name}.counts_per_{key} and readback"),
+                true,
+                Influence::Mandatory(Some(resolution)),
+                rounded,
+            ),
+            Candidate::of_key(
+                format!("{name}-settling"),
+                &format!("axes.{name}.settle_ms = {}", axis.settle_s * 1e3),
+                lag > 0.0,
+                Influence::Sized(Bound { value: lag, unit }),
+                "behind after a stop by what its acceleration asks, (1 - t/settle)³, then exactly \
+                 at rest",
+            ),
+        ]
+    }
+
+    /// What `[simulated]` states of an axis.
+    fn flaws(&self, i: usize) -> Vec<Candidate> {
+        let (name, axis) = (AXIS_NAMES[i], &self.setting.nominal.axes[i]);
+        let AxisFlaws { backlash, encoder_error, ringing, missed_steps } =
+            self.setting.simulated.axes[i];
+        let (_, key, per_key) = units(i);
+        let of = |effect: &str, key_name: &str, size: f64, weigh: &dyn Fn() -> Influence, how| {
+            let cause = format!("simulated.{name}.{key_name} = {}", size * per_key);
+            let influence = if size > 0.0 { weigh() } else { Influence::Relative(0.0) };
+            Candidate::of_key(format!("{name}-{effect}"), &cause, size > 0.0, influence, how)
+        };
+        let error = encoder_error.map_or(0.0, |error| error.amplitude);
+        let rings = ringing.map_or(0.0, |ringing| ringing.amplitude);
+        let lost = missed_steps.map_or(0.0, |missed| self.lost(axis, &missed));
+        let lost_key = format!("missed_steps: rms at the end of the run, {key}");
+        vec![
+            of(
+                BACKLASH,
+                &format!("backlash_{key}"),
+                backlash,
+                &|| self.off(i, backlash),
+                "the load stays until the play is used up, from either side",
+            ),
+            of(
+                ENCODER_ERROR,
+                &format!("encoder_error.amplitude_{key}"),
+                error,
+                &|| self.off(i, error),
+                "a sine in the position, its phase drawn by the seed",
+            ),
+            of(
+                SETTLE_RINGING,
+                &format!("ringing.amplitude_{key}"),
+                rings,
+                &|| ringing.map_or(Influence::Relative(0.0), |r| self.ringing(i, &r)),
+                "a damped oscillation after each stop, averaged by the dwell's ADC readings",
+            ),
+            of(
+                MISSED_STEPS,
+                &lost_key,
+                lost,
+                &|| self.off(i, lost),
+                "a move falls short with a probability, drawn by its number since boot",
+            ),
+        ]
+    }
+
+    /// Root mean square of what is lost by the end of the run if every loss goes the same way,
+    /// units. A move a dwell, each waiting for the axis to settle.
+    fn lost(&self, axis: &NominalAxis, missed: &MissedSteps) -> f64 {
+        let terms = self.setting.terms;
+        let moves = terms.run_s / (terms.dwell_s + axis.settle_s);
+        let p = missed.probability_per_move;
+        let mean = moves * p;
+        missed.counts * libm::sqrt(mean * (1.0 - p) + mean * mean) / axis.counts_per_unit.abs()
+    }
+
+    /// In a dwell that begins when the axis's stated time to settle is over.
+    fn ringing(&self, i: usize, ringing: &Ringing) -> Influence {
+        let axis = &self.setting.nominal.axes[i];
+        let rings = Rings::new(ringing, axis.counts_per_unit);
+        let n = (self.setting.terms.dwell_s * f64::from(axis_rate(self.setting))).max(1.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 64
+        let trials = n.min(f64::from(RINGING_TRIALS)) as u32;
+        let at = |k: u32| {
+            let part = (f64::from(k) + 0.5) / f64::from(trials);
+            axis.settle_s + part * self.setting.terms.dwell_s
+        };
+        let left: Vec<f64> = (0..trials).map(|k| ringing.amplitude * rings.left(at(k))).collect();
+        let moved = |joints: Joints, sign: f64| -> Vec<Axis> {
+            let off = left.iter().map(|by| {
+                let mut joints = joints;
+                joints[i] += sign * by;
+                Perfect.seen(joints)
+            });
+            off.collect()
+        };
+        self.largest(&[&|joints| moved(joints, 1.0), &|joints| moved(joints, -1.0)])
+    }
+
+    fn of_misalignment(&self) -> Vec<Candidate> {
+        let stated = &self.setting.simulated.misalignment;
+        let [x, y, z] = &stated.axis_offset_m;
+        let mm = |of: &Uncertain| format!("{} (u {})", of.value * 1e3, of.u * 1e3);
+        let deg = |of: &Uncertain| format!("{} (u {})", of.value.to_degrees(), of.u.to_degrees());
+        let of = |name: &str, key: String, numbers: &[&Uncertain], how: &str| {
+            let calls = numbers.iter().any(|number| !number.is_none());
+            let influence =
+                if calls { self.misaligned(stated, name) } else { Influence::Relative(0.0) };
+            Candidate::of_key(name, &key, calls, influence, how)
+        };
+        vec![
+            of(
+                AXIS_OFFSET,
+                format!("simulated.axis_offset: {}, {}, {} mm", mm(x), mm(y), mm(z)),
+                &[x, y, z],
+                "the detector's axis passes the arm's beside the turntable's, exactly",
+            ),
+            of(
+                NON_ORTHOGONALITY,
+                format!(
+                    "simulated.non_orthogonality: arm {}, beam {} deg",
+                    deg(&stated.arm_axis_rad),
+                    deg(&stated.beam_rad)
+                ),
+                &[&stated.arm_axis_rad, &stated.beam_rad],
+                "the arm's axis and the beam lean, as exact rotations",
+            ),
+            of(
+                WOBBLE,
+                format!("simulated.wobble.tilt_deg = {}", deg(&stated.wobble_rad)),
+                &[&stated.wobble_rad],
+                "the turntable's top leans and turns with it, as an exact rotation",
+            ),
+        ]
+    }
+
+    /// Of one kind of misalignment, at the corners of its numbers' spread. A direction that is
+    /// drawn is tried all round.
+    fn misaligned(&self, stated: &Misalignment, name: &str) -> Influence {
+        let corners = stated.corners(name);
+        let seen: Vec<_> =
+            corners.iter().map(|rig| move |joints: Joints| vec![rig.seen(joints)]).collect();
+        let errors: Vec<Departing<'_>> = seen.iter().map(|seen| seen as Departing<'_>).collect();
+        self.largest(&errors)
+    }
+}
+
+fn axis_rate(setting: &Setting<'_>) -> u32 {
+    setting.nominal.detector.adc_rate_hz
+}
+
+/// Of an axis's positions: for a bound, in the file's keys, and how many of those a unit is.
+fn units(axis: usize) -> (BoundUnit, &'static str, f64) {
+    if axis < 2 {
         (BoundUnit::Radian, "deg", 180.0 / core::f64::consts::PI)
     } else {
         (BoundUnit::Metre, "mm", 1e3)
-    };
-    let sized = |value: f64| Influence::Sized(Bound { value, unit });
-    let drawn = |what: &str, key_name: &str, u: f64, how: &str| {
-        let cause = format!("axes.{name}.{key_name}_{key} = {}", u * per_key);
-        Candidate::of_key(format!("{name}-{what}"), &cause, u > 0.0, sized(u), how)
-    };
-    let resolution = Bound { value: 0.5 / axis.counts_per_unit.abs(), unit };
-    let rounded = if axis.has_encoder {
-        "the position, rounded to a count"
-    } else {
-        "the setpoint, rounded to a count"
-    };
-    let lag = AxisTruth::lag_units_max(axis);
-    vec![
-        drawn("zero", "u_zero", axis.u_zero, "where the home mark stands, drawn once by the seed"),
-        drawn("homing", "u_homing", axis.u_homing, "drawn at each homing of a boot, by its number"),
-        drawn(
-            "scale",
-            "u_readback",
-            axis.u_readback,
-            "drawn for each count of the scale by the seed",
-        ),
-        Candidate::of_key(
-            format!("{name}-resolution"),
-            &format!("axes.{name}.counts_per_{key} and readback"),
-            true,
-            Influence::Mandatory(Some(resolution)),
-            rounded,
-        ),
-        Candidate::of_key(
-            format!("{name}-settling"),
-            &format!("axes.{name}.settle_ms = {}", axis.settle_s * 1e3),
-            lag > 0.0,
-            sized(lag),
-            "behind after a stop by what its acceleration asks, (1 - t/settle)³, then exactly at rest",
-        ),
-    ]
+    }
 }

@@ -1,0 +1,338 @@
+//! One axis as it is: where its mark stands, how its scale departs, and where it really is while
+//! it moves, settles, rings, plays and slips.
+//!
+//! Counts here: the drive stands where the setpoint says, but for lost steps; the load follows it
+//! through the play, and swings about it after a stop. An encoder sits on the load and counts from
+//! the home mark as it was found. The true position is the load's, with the errors of the scale.
+
+use core::time::Duration;
+
+use firmware_protocol::Instant;
+
+use super::flaws::{AxisFlaws, ENCODER_ERROR, MISSED_STEPS};
+use super::play::Play;
+use super::ringing::Rings;
+use super::scale::{Lines, Periodic};
+use crate::NominalAxis;
+use crate::chance::{Stream, draw};
+use crate::switches::Switches;
+
+/// An axis as drawn: where its mark really is, and how its scale departs.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct AxisTruth {
+    name: &'static str,
+    seed: u64,
+    counts_per_unit: f64,
+    /// Where the home mark stands, in counts from where the axis's value is zero.
+    mark_counts: f64,
+    /// Standard deviation of finding it again.
+    homing_counts: f64,
+    lines: Option<Lines>,
+    periodic: Option<Periodic>,
+    settle: Option<Settle>,
+    rings: Option<Rings>,
+    play: Option<Play>,
+    misses: Option<Misses>,
+    /// Where it stands at boot, counts.
+    start_counts: f64,
+    /// Where the limit switches stand, counts.
+    switch_counts: (f64, f64),
+    speed_counts_per_s: f64,
+}
+
+/// A stepper that is asked for more torque than it has falls back by whole electrical cycles,
+/// here once a move at most, and stands that much short of where it was sent.
+#[derive(Debug, Clone, PartialEq)]
+struct Misses {
+    probability: f64,
+    counts: f64,
+    effect: String,
+}
+
+/// After a stop the axis is behind by what its servo lags at the axis's acceleration, and comes
+/// in as (1 - t/T)³: at rest exactly after the stated time T.
+#[derive(Debug, Clone, PartialEq)]
+struct Settle {
+    time_s: f64,
+    lag_counts_max: f64,
+}
+
+/// A critically damped servo whose error falls as (1 - t/T)³ begins with a time constant of T/3:
+/// it lags a constant acceleration a by a (T/3)².
+const LAG_PART_OF_SETTLE: f64 = 1.0 / 3.0;
+
+impl AxisTruth {
+    pub(crate) fn draw(
+        name: &'static str,
+        axis: &NominalAxis,
+        flaws: &AxisFlaws,
+        start: Option<f64>,
+        limit_margin: f64,
+        seed: u64,
+    ) -> Self {
+        let per_unit = axis.counts_per_unit;
+        let (low, high) = (f64::from(axis.travel_counts.0), f64::from(axis.travel_counts.1));
+        let zero = if axis.u_zero > 0.0 { draw(seed, &effect("zero", name), 0) } else { 0.0 };
+        let fraction = start.unwrap_or_else(|| {
+            let uniform = crate::chance::Stream::new(seed, &effect("start", name), 0).uniform();
+            0.25 + uniform / 2.0
+        });
+        let lines = (axis.u_readback > 0.0).then(|| Lines {
+            sigma_counts: axis.u_readback * per_unit.abs(),
+            effect: effect("scale", name),
+            seed,
+        });
+        let periodic = flaws
+            .encoder_error
+            .as_ref()
+            .map(|error| Periodic::new(error, per_unit, &format!("{name}-{ENCODER_ERROR}"), seed));
+        let lag_s = axis.settle_s * LAG_PART_OF_SETTLE;
+        let settle = (axis.settle_s > 0.0).then(|| Settle {
+            time_s: axis.settle_s,
+            lag_counts_max: f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s,
+        });
+        let mark_counts = zero * axis.u_zero * per_unit;
+        // The travel is stated from the mark, wherever that really is.
+        let beyond = limit_margin * (high - low);
+        Self {
+            name,
+            seed,
+            counts_per_unit: per_unit,
+            mark_counts,
+            homing_counts: axis.u_homing * per_unit.abs(),
+            lines,
+            periodic,
+            settle,
+            rings: flaws.ringing.as_ref().map(|ringing| Rings::new(ringing, per_unit)),
+            play: (flaws.backlash > 0.0).then(|| Play::new(flaws.backlash * per_unit.abs())),
+            misses: flaws.missed_steps.map(|missed| Misses {
+                probability: missed.probability_per_move,
+                counts: missed.counts,
+                effect: format!("{name}-{MISSED_STEPS}"),
+            }),
+            start_counts: libm::round(low + fraction * (high - low)),
+            switch_counts: (mark_counts + low - beyond, mark_counts + high + beyond),
+            speed_counts_per_s: f64::from(axis.speed_counts_per_s),
+        }
+    }
+
+    /// How far the axis may be off when it stops, in units.
+    pub(crate) fn lag_units_max(axis: &NominalAxis) -> f64 {
+        let lag_s = axis.settle_s * LAG_PART_OF_SETTLE;
+        f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s / axis.counts_per_unit.abs()
+    }
+
+    /// The mark as it is found at the n-th homing of this boot, counts. By its number and not by
+    /// the clock: a resumed run finds it where the run before did.
+    fn mark_found(&self, homing: u32) -> f64 {
+        if self.homing_counts <= 0.0 {
+            return self.mark_counts;
+        }
+        let again = draw(self.seed, &effect("homing", self.name), u64::from(homing));
+        self.mark_counts + self.homing_counts * again
+    }
+
+    fn scale_error(&self, mechanical_counts: f64) -> f64 {
+        let lines = self.lines.as_ref().map_or(0.0, |lines| lines.error_counts(mechanical_counts));
+        let sine = self.periodic.as_ref().map_or(0.0, |sine| sine.error_counts(mechanical_counts));
+        lines + sine
+    }
+
+    /// What the n-th move since boot loses, counts: by its number, so that it does not depend on
+    /// where the axis goes or when.
+    fn missed(&self, number: u64) -> f64 {
+        let Some(misses) = &self.misses else { return 0.0 };
+        let uniform = Stream::new(self.seed, &misses.effect, number).uniform();
+        if uniform < misses.probability { misses.counts } else { 0.0 }
+    }
+}
+
+fn effect(what: &str, axis: &str) -> String {
+    format!("{axis} {what}")
+}
+
+/// An axis in motion.
+#[derive(Debug, Clone)]
+pub(crate) struct Axis {
+    truth: AxisTruth,
+    /// The mechanical position at setpoint zero, counts.
+    origin_counts: f64,
+    setpoint_counts: f64,
+    /// By how much the axis was behind its setpoint when that last moved, counts.
+    behind_counts: f64,
+    /// By how much it rang then, counts.
+    rings_counts: f64,
+    play: Option<Play>,
+    /// By how much the drive is ahead of origin and setpoint: by what the play was when it found
+    /// its mark, less what steps were lost since.
+    drive_ahead_counts: f64,
+    moves: u64,
+    stopped: Instant,
+    homings: u32,
+    mark_counts: f64,
+    search: Option<Search>,
+    switches: Switches,
+}
+
+/// A search for the home mark.
+#[derive(Debug, Clone, Copy)]
+struct Search {
+    /// Where the load has been since it began, counts from the origin.
+    low: f64,
+    high: f64,
+    /// The setpoint at which it passed the mark, and by how much the load was ahead there.
+    found: Option<(f64, f64)>,
+}
+
+impl Axis {
+    pub(crate) fn at_boot(truth: &AxisTruth) -> Self {
+        Self {
+            origin_counts: truth.start_counts,
+            setpoint_counts: 0.0,
+            behind_counts: 0.0,
+            rings_counts: 0.0,
+            play: truth.play,
+            drive_ahead_counts: 0.0,
+            moves: 0,
+            stopped: Instant::ZERO,
+            homings: 0,
+            mark_counts: truth.mark_found(0),
+            search: None,
+            switches: Switches::new(truth.switch_counts, truth.speed_counts_per_s),
+            truth: truth.clone(),
+        }
+    }
+
+    pub(crate) fn begin_motion(&mut self, now: Instant, towards_counts: f64) {
+        let [from, towards] =
+            [self.setpoint_counts, towards_counts].map(|counts| self.origin_counts + counts);
+        self.switches.begin_motion(now, from, towards);
+        self.moves += 1;
+        let lost = self.truth.missed(self.moves);
+        if lost > 0.0 {
+            self.slip((towards - from).clamp(-lost, lost));
+        }
+    }
+
+    /// The drive falls back by this against its move.
+    fn slip(&mut self, counts: f64) {
+        self.drive_ahead_counts -= counts;
+        if let Some(play) = &mut self.play {
+            play.drive(-counts);
+        }
+    }
+
+    /// By how much the load is ahead of origin and setpoint, at rest.
+    fn ahead_counts(&self) -> f64 {
+        self.drive_ahead_counts + self.play.map_or(0.0, |play| play.ahead_counts())
+    }
+
+    /// The limit switches' view of it: they are passed by the setpoint.
+    pub(crate) const fn switches(&mut self) -> &mut Switches {
+        &mut self.switches
+    }
+
+    /// When to look whether it has reached a limit switch.
+    pub(crate) const fn look_at(&self) -> Option<Instant> {
+        self.switches.look_at()
+    }
+
+    pub(crate) fn set_setpoint(&mut self, now: Instant, counts: f64) {
+        self.switches.pass(now, self.origin_counts + counts);
+        let moved = counts - self.setpoint_counts;
+        if moved == 0.0 {
+            return;
+        }
+        let lag = self.truth.settle.as_ref().map_or(0.0, |settle| settle.lag_counts_max);
+        self.behind_counts = -moved.clamp(-lag, lag);
+        self.rings_counts = self.truth.rings.map_or(0.0, |rings| rings.after(moved));
+        self.stopped = now;
+        self.setpoint_counts = counts;
+        if let Some(play) = &mut self.play {
+            play.drive(moved);
+        }
+        self.look_for_mark();
+    }
+
+    fn look_for_mark(&mut self) {
+        let (ahead, setpoint) = (self.ahead_counts(), self.setpoint_counts);
+        let mark = self.mark_counts - self.origin_counts;
+        let Some(search) = &mut self.search else { return };
+        search.low = search.low.min(setpoint + ahead);
+        search.high = search.high.max(setpoint + ahead);
+        if search.found.is_none() && (search.low..=search.high).contains(&mark) {
+            search.found = Some((mark - ahead, ahead));
+        }
+    }
+
+    /// Of the load, counts from the origin.
+    fn position(&self, now: Instant) -> f64 {
+        let mut position = self.setpoint_counts + self.ahead_counts();
+        let since_s = seconds(now.since(self.stopped));
+        if let Some(settle) = &self.truth.settle {
+            let rest = 1.0 - since_s / settle.time_s;
+            if rest > 0.0 {
+                position += self.behind_counts * rest * rest * rest;
+            }
+        }
+        if let Some(rings) = &self.truth.rings {
+            position += self.rings_counts * rings.left(since_s);
+        }
+        position
+    }
+
+    /// What an encoder reads: the nearest count.
+    #[allow(clippy::cast_possible_truncation)] // saturates beyond any axis
+    pub(crate) fn readback(&self, now: Instant, has_encoder: bool) -> i32 {
+        libm::round(if has_encoder { self.position(now) } else { self.setpoint_counts }) as i32
+    }
+
+    /// The axis's true value, radians or metres.
+    pub(crate) fn value(&self, now: Instant) -> f64 {
+        let mechanical = self.origin_counts + self.position(now);
+        (mechanical + self.truth.scale_error(mechanical)) / self.truth.counts_per_unit
+    }
+
+    /// When the axis will be at rest.
+    pub(crate) fn rests_at(&self) -> Instant {
+        let settles_s = self.truth.settle.as_ref().map_or(0.0, |settle| settle.time_s);
+        let rings_s = self.truth.rings.map_or(0.0, |rings| rings.lasts_s());
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds at most
+        let micros = libm::ceil(settles_s.max(rings_s) * 1e6) as u64;
+        self.stopped + Duration::from_micros(micros)
+    }
+
+    pub(crate) fn begin_search(&mut self) {
+        self.mark_counts = self.truth.mark_found(self.homings);
+        let here = self.setpoint_counts + self.ahead_counts();
+        self.search = Some(Search { low: here, high: here, found: None });
+        self.look_for_mark();
+    }
+
+    pub(crate) fn home_mark(&self) -> Option<f64> {
+        self.search?.found.map(|(setpoint, _)| setpoint)
+    }
+
+    /// It stands still on its mark, the drive where it was when the load passed that: that it has
+    /// settled there is the caller's word.
+    pub(crate) fn set_home(&mut self) {
+        let found = self.search.take().and_then(|search| search.found);
+        self.drive_ahead_counts = match (&self.play, found) {
+            // The drive stands ahead of the mark by what the load was behind it.
+            (Some(_), Some((_, load_ahead))) => self.drive_ahead_counts - load_ahead,
+            _ => 0.0,
+        };
+        self.origin_counts = self.mark_counts;
+        self.setpoint_counts = 0.0;
+        self.behind_counts = 0.0;
+        self.rings_counts = 0.0;
+        self.homings += 1;
+    }
+}
+
+fn seconds(duration: Duration) -> f64 {
+    duration.as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests;
