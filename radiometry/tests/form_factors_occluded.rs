@@ -341,3 +341,54 @@ fn bounds_hold_from_coarse_to_fine() {
         }
     }
 }
+
+#[test]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "places in short lists"
+)]
+fn anything_at_all_gives_a_factor_or_an_error() {
+    let odd = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-320, 1e-200, 1e-9, 1e9, 1e200, f64::MAX];
+    let mut chance = Chance(59);
+    let coarse = Tolerance::new(1e-2, 0.0, 20_000).unwrap();
+    let mut counts = [0; 2];
+    for _ in 0..3000 {
+        // Mostly of one size, or hardly a scene would have any digits.
+        let mut pick = |wild: f64| {
+            let at = chance.next();
+            let index = (at * odd.len() as f64).floor();
+            if chance.next() < wild {
+                odd.into_iter().nth(index as usize).unwrap_or(0.0)
+            } else {
+                (4.0 * at).floor() / 2.0
+            }
+        };
+        let wild = if pick(0.0) > 1.0 { 0.5 } else { 0.02 };
+        let mut corners = |count: usize| {
+            let corner = |_| DVec3::new(pick(wild), pick(wild), pick(wild));
+            (0..count).map(corner).collect::<Vec<_>>()
+        };
+        let (from, to) = (Polygon::new(corners(3)), Polygon::new(corners(3)));
+        let (Ok(from), Ok(to)) = (from, to) else { continue };
+        let [a, b, c] = [corners(1)[0], corners(1)[0], corners(1)[0]];
+        let mut bodies = Vec::new();
+        bodies.extend(Polygon::new(corners(3)).ok().map(Occluder::Polygon));
+        bodies.extend(Polygon::new(corners(4)).ok().map(Occluder::Polygon));
+        bodies.extend(Disk::new(a, b, c.x).ok().map(Occluder::Disk));
+        bodies.extend(Sphere::new(b, c.y).ok().map(Occluder::Sphere));
+        bodies.extend(HalfPlane::new(c.z, a.x).ok().map(Occluder::HalfPlane));
+        // One of them, so that not everything is hidden.
+        let body = bodies.swap_remove((a.y.abs() as usize) % bodies.len());
+        match polygons_occluded(&from, &to, &[body], coarse) {
+            Ok(found) | Err(EstimateError::Unmet { estimate: found, .. }) => {
+                counts[0] += 1;
+                assert!((0.0..=1.0).contains(&found.value), "{found:?}");
+                assert!(found.error_bound >= 0.0, "{found:?}");
+            }
+            Err(EstimateError::Domain(_)) => counts[1] += 1,
+            Err(error) => panic!("{from:?} {to:?}: {error}"),
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+}
