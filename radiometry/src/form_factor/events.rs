@@ -1,6 +1,6 @@
 //! Where on a source polygon the visible part of a target changes its kind: along lines on which a
 //! corner of the target appears on an edge of an occluder, or a corner of an occluder on an edge of
-//! the target. Cut along these, the source falls into cells within which what is seen is smooth, so
+//! the target, and along those from which an occluder is seen edge-on. Cut along these, the source falls into cells within which what is seen is smooth, so
 //! that cubature converges, and no shadow hides between its nodes. (Where three edges of three polygons
 //! meet in sight there is a curve of higher order, which is left to the cubature.)
 
@@ -57,6 +57,22 @@ impl Plane {
         }
         let down = |x: DVec3| corner + (x - corner) * (top / (top - self.height(x)));
         Some([self.place(down(a)), self.place(down(b))])
+    }
+}
+
+impl Plane {
+    /// The line from which a flat body is seen edge-on, as far as a source of the size of the unit of
+    /// length may reach; none if it is parallel.
+    pub(super) fn edge_on(&self, point: DVec3, normal: DVec3) -> Option<[DVec2; 2]> {
+        const REACH: f64 = 16.0;
+        let slope = DVec2::new(normal.dot(self.e), normal.dot(self.f));
+        let steepness = slope.length();
+        if steepness < ON_LINE {
+            return None;
+        }
+        let foot = slope * (normal.dot(point - self.origin) / (steepness * steepness));
+        let along = slope.perp() * (REACH / steepness);
+        (foot.length() < REACH).then(|| [foot - along, foot + along])
     }
 }
 

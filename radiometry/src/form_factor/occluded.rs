@@ -242,10 +242,16 @@ fn area_of(part: &[DVec3], normal: DVec3) -> f64 {
     fan.fold(DVec3::ZERO, |sum, triangle| sum + triangle).dot(normal) / 2.0
 }
 
-/// Segments of all bodies, those where one stands on the source first.
+/// Segments of all bodies.
 fn events(plane: &Plane, sight: &Sight) -> Vec<[DVec2; 2]> {
     let mut events = Vec::new();
     let front = (plane.origin, plane.normal);
+    events
+        .extend(sight.flats.iter().filter_map(|flat| plane.edge_on(flat.corners[0], flat.normal)));
+    events.extend(sight.rounds.iter().filter_map(|round| match round {
+        Round::Disk { center, axis, .. } => plane.edge_on(*center, *axis),
+        Round::Sphere { .. } => None,
+    }));
     for part in &sight.target {
         let corner = part[0];
         let normal = (part[1] - corner).cross(part[2] - corner).normalize_or_zero();
