@@ -343,6 +343,39 @@ fn bounds_hold_from_coarse_to_fine() {
 }
 
 #[test]
+fn bounds_hold_in_random_scenes() {
+    let mut chance = Chance(61);
+    for scene in 0..16 {
+        let mut corner = |low: f64, high: f64| {
+            DVec3::new(chance.next(), chance.next(), low + (high - low) * chance.next())
+        };
+        let mut bodies: Vec<Occluder> = (0..=scene % 3)
+            .map(|_| Polygon::new(vec![corner(0.0, 1.0), corner(0.0, 1.0), corner(0.0, 1.0)]))
+            .map(|triangle| Occluder::Polygon(triangle.unwrap()))
+            .collect();
+        if scene % 4 == 0 {
+            let disk = Disk::new(corner(0.3, 0.7), corner(-1.0, 1.0), 0.2).unwrap();
+            bodies.push(Occluder::Disk(disk));
+        }
+        let find = |relative: f64| {
+            let (from, to) = (square(0.0), square(1.0));
+            let tolerance = Tolerance::new(relative, 0.0, 15_000).unwrap();
+            match polygons_occluded(&from, &to, &bodies, tolerance) {
+                Ok(found) | Err(EstimateError::Unmet { estimate: found, .. }) => found,
+                Err(error) => panic!("{bodies:?}: {error}"),
+            }
+        };
+        let fine = find(1e-7);
+        assert!(fine.error_bound < 1e-3, "{bodies:?} {fine:?}");
+        for relative in [1e-2, 1e-4] {
+            let found = find(relative);
+            let off = (found.value - fine.value).abs();
+            assert!(off <= found.error_bound + fine.error_bound, "{bodies:?}: {found:?} {fine:?}");
+        }
+    }
+}
+
+#[test]
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
