@@ -112,6 +112,17 @@ impl Candidate {
         }
     }
 
+    /// Whether a person who says this means it: its whole name, or the end of that after a
+    /// hyphen, which stands for all that end so ("backlash" for every axis's).
+    fn answers_to(&self, wish: &str) -> bool {
+        let ends = self.name.strip_suffix(wish);
+        ends.is_some_and(|rest| rest.is_empty() || (!wish.is_empty() && rest.ends_with('-')))
+    }
+
+    const fn is_mandatory(&self) -> bool {
+        matches!(self.influence, Influence::Mandatory(_))
+    }
+
     fn bound(&self) -> Option<Bound> {
         match self.influence {
             Influence::Mandatory(bound) => bound,
@@ -156,11 +167,12 @@ pub(crate) fn decide(
     let mut why: Vec<Why> = candidates
         .iter()
         .map(|candidate| {
-            if terms.without.contains(&candidate.name) {
+            let is_meant = |wishes: &[String]| wishes.iter().any(|wish| candidate.answers_to(wish));
+            if is_meant(&terms.without) && !candidate.is_mandatory() {
                 Why::Without
             } else if candidate.cause.is_none() {
                 Why::NotCalledFor
-            } else if terms.force.contains(&candidate.name) {
+            } else if is_meant(&terms.force) {
                 Why::Forced
             } else {
                 Why::CalledFor
@@ -218,14 +230,15 @@ fn check(candidates: &[Candidate], terms: &Terms) -> Result<(), CompileError> {
     for (name, is_forced) in
         terms.force.iter().map(|name| (name, true)).chain(terms.without.iter().map(|n| (n, false)))
     {
-        let Some(candidate) = candidates.iter().find(|candidate| candidate.name == *name) else {
+        let meant: Vec<&Candidate> = candidates.iter().filter(|c| c.answers_to(name)).collect();
+        let Some(first) = meant.first() else {
             let known: Vec<String> = candidates.iter().map(|c| c.name.clone()).collect();
             let nearest = spanned_toml::nearest(name, &known).cloned();
             return Err(CompileError::UnknownEffect { name: name.clone(), nearest, known });
         };
         let refused = if is_forced {
-            candidate.cause.is_none().then(|| candidate.how_out.clone())
-        } else if matches!(candidate.influence, Influence::Mandatory(_)) {
+            meant.iter().all(|c| c.cause.is_none()).then(|| first.how_out.clone())
+        } else if meant.iter().all(|c| c.is_mandatory()) {
             Some("it is part of what a reading is".to_owned())
         } else {
             terms.force.contains(name).then(|| "it is forced as well".to_owned())
@@ -294,5 +307,20 @@ mod tests {
         assert!(refused(&["absent"], &[]).contains("not called for: some.key = 1"));
         assert!(refused(&[], &["signal"]).contains("part of what a reading is"));
         assert!(refused(&["large"], &["large"]).contains("forced as well"));
+    }
+
+    #[test]
+    fn the_end_of_a_name_stands_for_all_that_end_so() {
+        let names = ["theta-play", "phi-play", "x-play", "horseplay"];
+        let candidates =
+            names.map(|name| candidate(name, name != "phi-play", Influence::Relative(0.1)));
+        let decided = |force: &[&str], without: &[&str]| {
+            let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+            let terms = Terms { force: owned(force), without: owned(without), ..Terms::default() };
+            let rows = decide(candidates.to_vec(), 1.0, &terms).unwrap().rows;
+            rows.into_iter().filter(|row| row.included).map(|row| row.name).collect::<Vec<_>>()
+        };
+        assert_eq!(decided(&["play"], &[]), ["theta-play", "x-play"]);
+        assert_eq!(decided(&["play", "horseplay"], &["x-play"]), ["theta-play", "horseplay"]);
     }
 }
