@@ -16,6 +16,8 @@ pub(crate) struct Case {
     pub(crate) simulated: Simulated,
     pub(crate) terms: Terms,
     pub(crate) measure: Measure,
+    /// An outline across the region at this x, and how far the effect reaches, metres.
+    pub(crate) outline_m: Option<(f64, f64)>,
 }
 
 /// How the true influence is had.
@@ -38,7 +40,7 @@ pub(crate) enum Measure {
 
 pub(crate) type Draw = fn(&mut Dice) -> Case;
 
-pub(crate) const EFFECTS: [Draw; 21] = [
+pub(crate) const EFFECTS: [Draw; 24] = [
     stray_light,
     dark_current,
     dark_drift,
@@ -60,6 +62,9 @@ pub(crate) const EFFECTS: [Draw; 21] = [
     missed_steps,
     non_orthogonality,
     wobble,
+    axis_offset,
+    x_zero,
+    x_backlash,
 ];
 
 /// `SplitMix64` (Steele, Lea, Flood 2014).
@@ -127,7 +132,15 @@ fn case(effect: &'static str, scene: Scene, radiance: f64, measure: Measure) -> 
     nominal.detector.gains =
         vec![NominalGain { name: "only".into(), full_scale_a, u_relative: 0.0 }];
     let terms = Terms { region: Some(REGION), ..Terms::default() };
-    Case { effect, scene, nominal, simulated: Simulated::default(), terms, measure }
+    Case {
+        effect,
+        scene,
+        nominal,
+        simulated: Simulated::default(),
+        terms,
+        measure,
+        outline_m: None,
+    }
 }
 
 fn of_even(effect: &'static str, dice: &mut Dice, measure: Measure) -> (Case, f64) {
@@ -309,5 +322,36 @@ fn wobble(dice: &mut Dice) -> Case {
     let mut case = of_lobe("wobble", dice, Measure::Poses(0.0));
     let tilt = dice.decades(-6.0, -2.0);
     case.simulated.misalignment.wobble_rad = Uncertain { value: tilt, u: 0.0 };
+    case
+}
+
+/// A patch that ends within the region.
+fn of_outline(effect: &'static str, dice: &mut Dice, reach_m: f64, measure: Measure) -> Case {
+    let radiance = dice.decades(-2.0, 3.0);
+    let edge_m = dice.uniform(-0.005, 0.005);
+    let shape = Shape::Rectangle { x_m: (-0.2, edge_m), y_m: (-0.2, 0.2) };
+    let patch = Emitter::lambertian(shape, radiance);
+    let scene = Scene::new(Quantity::Radiance).with(patch).unwrap();
+    Case { outline_m: Some((edge_m, reach_m)), ..case(effect, scene, radiance, measure) }
+}
+
+fn axis_offset(dice: &mut Dice) -> Case {
+    let offset_m = dice.decades(-4.0, -2.3);
+    let mut case = of_outline("axis-offset", dice, offset_m, Measure::Poses(0.0));
+    case.simulated.misalignment.axis_offset_m[0] = Uncertain { value: offset_m, u: 0.0 };
+    case
+}
+
+fn x_zero(dice: &mut Dice) -> Case {
+    let u_m = dice.decades(-4.0, -2.5);
+    let mut case = of_outline("x-zero", dice, u_m, Measure::Seeds);
+    case.nominal.axes[2].u_zero = u_m;
+    case
+}
+
+fn x_backlash(dice: &mut Dice) -> Case {
+    let play_m = dice.decades(-4.0, -2.5);
+    let mut case = of_outline("x-backlash", dice, play_m, Measure::Sides);
+    case.simulated.axes[2].backlash = play_m;
     case
 }

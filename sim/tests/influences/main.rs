@@ -28,7 +28,7 @@ fn every_bound_holds_and_is_not_too_wide() {
             let (bound, found) = (case.bound(), case.true_influence(&mut dice));
             let is_random =
                 matches!(case.measure, Measure::Dwells | Measure::Seeds | Measure::Moved(_));
-            // A standard deviation of 400 dwells, or of 40 seeds, has an error of its own.
+            // A standard deviation of 400 dwells, or of 24 seeds, has an error of its own.
             let chance = match case.measure {
                 Measure::Dwells => 1.15,
                 _ if is_random => 1.45,

@@ -8,10 +8,17 @@ use sim::{BoundUnit, Compiled, SimulatedBoard, Terms, compile};
 use crate::bench::counts;
 use crate::cases::{Case, Dice, Measure, RATE_HZ, REGION};
 
+/// θ and φ, degrees; x, metres.
+type Pose = [f64; 3];
+
 impl Case {
     /// Compiled with the effect forced in or left out, and nothing else that is random.
     fn compile(&self, is_in: bool, seed: u64) -> Arc<Compiled> {
-        let silent = ["shot-noise", "read-noise"].into_iter().filter(|name| *name != self.effect);
+        // What the axis alone sees has the sharper changes; the beam is in for some of the cases.
+        let is_beam_in = matches!(self.measure, Measure::Poses(_)) && self.outline_m.is_none();
+        let beam = (!is_beam_in).then_some("finite-beam");
+        let silent = ["shot-noise", "read-noise"].into_iter().chain(beam);
+        let silent = silent.filter(|name| *name != self.effect);
         let mut without: Vec<String> = silent.map(str::to_owned).collect();
         let mut force = Vec::new();
         if is_in { &mut force } else { &mut without }.push(self.effect.to_owned());
@@ -51,11 +58,11 @@ impl Case {
     pub(crate) fn true_influence(&self, dice: &mut Dice) -> f64 {
         let pair = |seed| [true, false].map(|is_in| Bench::new(self, &self.compile(is_in, seed)));
         let largest = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
-        let poses = poses(dice);
+        let poses = self.poses(dice);
         match self.measure {
             Measure::Poses(at_s) => {
                 let [mut with, mut without] = pair(1);
-                let of = |pose: &[f64; 2]| {
+                let of = |pose: &Pose| {
                     let read = |bench: &mut Bench| {
                         bench.go_to(*pose, 0.0);
                         bench.dwell(0, at_s)
@@ -98,16 +105,17 @@ impl Case {
                 let last = f64::from(moves);
                 for i in 0..moves {
                     let part = f64::from(i) / last;
-                    bench.go_to([pose[0] * part, pose[1] * part], 0.0);
+                    bench.go_to(pose.map(|joint| joint * part), 0.0);
                 }
                 bench.go_to(pose, 0.0);
             }),
             Measure::Sides => {
                 let [mut with, mut without] = pair(1);
-                let of = |pose: &[f64; 2]| {
-                    let sides = [-20.0, 20.0].map(|aside| {
+                let of = |pose: &Pose| {
+                    let sides = [-1.0, 1.0].map(|side| {
+                        let aside = [pose[0] + 20.0 * side, pose[1], pose[2] + 0.01 * side];
                         let read = |bench: &mut Bench| {
-                            bench.go_to([pose[0] + aside, pose[1]], 0.0);
+                            bench.go_to(aside, 0.0);
                             bench.go_to(*pose, 100.0);
                             bench.dwell(0, 100.0)
                         };
@@ -120,9 +128,21 @@ impl Case {
         }
     }
 
+    /// All over the region's directions and denser near the normal; or about the outline.
+    fn poses(&self, dice: &mut Dice) -> Vec<Pose> {
+        if let Some((edge_m, reach_m)) = self.outline_m {
+            let aside = |dice: &mut Dice| reach_m * dice.uniform(-1.5, 1.5);
+            return (0..400).map(|_| [0.0, 0.0, edge_m + aside(dice)]).collect();
+        }
+        let theta_max = REGION.theta_max_rad.to_degrees();
+        let theta = |dice: &mut Dice| theta_max * dice.decades(-2.0, 0.0);
+        let tried = (0..400).map(|_| [theta(dice), dice.uniform(-170.0, 170.0), 0.0]);
+        tried.chain([[theta_max, 0.0, 0.0]]).collect()
+    }
+
     /// Over seeds, in the pose where it is the largest, at the end of the run.
-    fn rms(&self, poses: &[[f64; 2]], go: &mut dyn FnMut(&mut Bench, [f64; 2])) -> f64 {
-        const SEEDS: u64 = 40;
+    fn rms(&self, poses: &[Pose], go: &mut dyn FnMut(&mut Bench, Pose)) -> f64 {
+        const SEEDS: u64 = 24;
         let mut sums = vec![0.0; poses.len()];
         let mut without = Bench::new(self, &self.compile(false, 1));
         let expected: Vec<f64> = poses
@@ -145,18 +165,6 @@ impl Case {
         }
         sums.into_iter().fold(0.0, f64::max).sqrt()
     }
-}
-
-/// θ and φ, degrees, all over the region's directions and denser near the normal.
-fn poses(dice: &mut Dice) -> Vec<[f64; 2]> {
-    let theta_max = REGION.theta_max_rad.to_degrees();
-    let mut poses = Vec::new();
-    for _ in 0..400 {
-        let theta = theta_max * dice.decades(-2.0, 0.0);
-        poses.push([theta, dice.uniform(-170.0, 170.0)]);
-    }
-    poses.push([theta_max, 0.0]);
-    poses
 }
 
 /// A board whose axes have been homed as the device core would do it.
@@ -186,9 +194,9 @@ impl Bench {
         Self { compiled: Arc::clone(compiled), board, gain: 0, n, counts_per_a }
     }
 
-    fn go_to(&mut self, [theta_deg, phi_deg]: [f64; 2], at_s: f64) {
+    fn go_to(&mut self, [theta_deg, phi_deg, x_m]: Pose, at_s: f64) {
         let now = Instant::from_micros(micros(at_s));
-        for (channel, target) in (0..).zip(counts(theta_deg, phi_deg, 0.0, 0.0).0) {
+        for (channel, target) in (0..).zip(counts(theta_deg, phi_deg, x_m, 0.0).0) {
             self.board.begin_motion(now, channel, f64::from(target));
             self.board.set_setpoint(now, channel, f64::from(target));
         }
