@@ -1,6 +1,7 @@
 //! What readings there will be: how bright, how long, how noisy at least. Effects state their
 //! influence relative to them. It does not know the scene that they come from.
 
+use crate::Emitter;
 use crate::compile::Setting;
 
 /// The readings of a region. Signals are the light's current in the axis's stead, without what
@@ -27,7 +28,11 @@ impl Levels {
     pub(crate) fn of(setting: &Setting<'_>) -> Self {
         let landmarks = setting.field.landmarks(&setting.region);
         let radiances = landmarks.iter().map(|ray| setting.field.radiance(ray));
-        let dimmest = radiances.fold(setting.brightest, f64::min) * BETWEEN_LANDMARKS;
+        let dimmest = if has_gap(setting) {
+            0.0
+        } else {
+            radiances.fold(setting.brightest, f64::min) * BETWEEN_LANDMARKS
+        };
         Self {
             lowest_a: dimmest * setting.current_per_radiance,
             highest_a: setting.brightest_a(),
@@ -117,3 +122,17 @@ impl Levels {
         Self::new((signal_a, signal_a), signal_a * 1e-6, rate_hz, (dwell_s, 3600.0))
     }
 }
+
+/// Whether the region has a place that no emitter covers: landmarks may all miss it. Emitters do
+/// not overlap; what else the scene has may cover it, and is left to the landmarks.
+fn has_gap(setting: &Setting<'_>) -> bool {
+    let (scene, region) = (setting.scene, &setting.region);
+    let shapes: Option<Vec<_>> = scene.emitters().iter().map(Emitter::shape).collect();
+    let Some(shapes) = shapes.filter(|_| scene.surfaces().is_empty()) else { return false };
+    let within = shapes.iter().map(|shape| shape.area_within_m2(region.x_m, region.y_m));
+    let covered: f64 = within.sum();
+    covered < region.area_m2() * (1.0 - ROUNDING)
+}
+
+/// Of a sum of areas.
+const ROUNDING: f64 = 1e-9;

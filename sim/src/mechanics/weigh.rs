@@ -23,9 +23,11 @@ const POLAR: u32 = 8;
 const AZIMUTHS: u32 = 8;
 /// Landmarks of the field's own that are tried.
 const LANDMARKS: usize = 200;
+/// Emitters whose brightest poses are.
+const PEAKS: usize = 64;
 /// Steps of a scan for outlines, and outlines that are kept.
 const SCAN: u32 = 48;
-const OUTLINES: usize = 48;
+const OUTLINES: usize = 256;
 /// From how many poses the search goes on, and how often its steps are halved.
 const STARTS: usize = 6;
 const HALVINGS: u32 = 12;
@@ -56,11 +58,12 @@ impl<'s> Trials<'s> {
         poses.extend(landmarks.iter().step_by(stride).map(joints));
         let radiance = |ray: &&Ray| setting.field.radiance(ray);
         let brightest = landmarks.iter().max_by(|a, b| radiance(a).total_cmp(&radiance(b)));
-        poses.extend(brightest.map(joints));
+        let bright: Vec<Joints> = brightest.map(joints).into_iter().chain(peaks(setting)).collect();
+        poses.extend(&bright);
         // The arm comes to every direction from either side of the zenith.
         let beyond: Vec<Joints> = poses.iter().map(|[t, p, x, y]| [-t, p - PI, *x, *y]).collect();
         let mut trials = Self { setting, poses, outlines: Vec::new() };
-        trials.find_outlines(brightest.map(joints));
+        trials.find_outlines(&bright);
         trials.poses.extend(beyond);
         trials
     }
@@ -159,10 +162,10 @@ impl<'s> Trials<'s> {
         theta.abs() <= theta_max_rad && within(x, x_m) && within(y, y_m)
     }
 
-    fn find_outlines(&mut self, brightest: Option<Joints>) {
+    fn find_outlines(&mut self, bright: &[Joints]) {
         let Region { x_m, y_m, theta_max_rad } = self.setting.region;
         let spans = [(0.0, theta_max_rad), (-PI, PI), x_m, y_m];
-        let mut through: Vec<Joints> = brightest.into_iter().collect();
+        let mut through = bright.to_vec();
         let slanted = theta_max_rad / 2.0;
         for (x, y) in places(&self.setting.region) {
             through.extend([[0.0, 0.0, x, y], [slanted, 1.0, x, y], [slanted, -2.0, x, y]]);
@@ -181,10 +184,13 @@ impl<'s> Trials<'s> {
             pose
         };
         let seen = |value: f64| self.seen(&Perfect.seen(at(value)));
+        // The pose itself is one of the steps: it may stand on something smaller than a step.
         let step = |i: u32| low + (high - low) * f64::from(i) / f64::from(SCAN);
+        let mut steps: Vec<f64> = (0..=SCAN).map(step).chain([pose[joint]]).collect();
+        steps.sort_by(f64::total_cmp);
         let mut found = Vec::new();
-        for i in 0..SCAN {
-            let (mut a, mut b) = (step(i), step(i + 1));
+        for pair in steps.windows(2) {
+            let (mut a, mut b) = (pair[0], pair[1]);
             let (mut of_a, mut of_b) = (seen(a), seen(b));
             if self.departure(of_a, of_b) < JUMP {
                 continue;
@@ -206,6 +212,18 @@ impl<'s> Trials<'s> {
         self.outlines.extend(found);
         self.outlines.truncate(OUTLINES);
     }
+}
+
+/// Where each flat emitter is brightest.
+fn peaks(setting: &Setting<'_>) -> Vec<Joints> {
+    let Region { x_m, y_m, theta_max_rad } = setting.region;
+    let emitters = setting.scene.emitters().iter();
+    let peaks = emitters.filter_map(|emitter| {
+        let (x, y, _) = emitter.brightest_within(x_m, y_m)?;
+        let (_, theta, phi) = emitter.peak_within(theta_max_rad)?;
+        Some([theta, phi, x, y])
+    });
+    peaks.take(PEAKS).collect()
 }
 
 /// By how much an error displaces the ray, in the unit of a joint that would displace it so.
