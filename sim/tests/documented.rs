@@ -56,7 +56,7 @@ fn read(text: &str, quantity: Quantity) -> Result<(), Problem> {
     }
     let examples = page().with_file_name("../examples/luminaire");
     let load = move |name: &str| {
-        if name.ends_with(".pgm") {
+        if Path::new(name).extension().is_some_and(|ext| ext == "pgm") {
             return Ok(b"P2\n2 2\n255\n9 200 30 255\n".to_vec());
         }
         fs::read(examples.join(name)).map_err(|error| error.to_string())
