@@ -5,15 +5,19 @@
 //! over v of a positive function.
 
 use core::f64::consts::{FRAC_PI_2, PI};
+use std::sync::OnceLock;
 
 use super::{form_factor, integrated, scaled};
 use crate::domain::{DomainError, finite, not_negative, positive, within};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
-use crate::quadrature::{Sum, adaptive_between, adaptive_noisy};
+use crate::quadrature::{Sum, adaptive_between, adaptive_noisy, gauss_legendre};
 use crate::quantity::FormFactor;
 
 /// Sums whose terms are larger than this times the sum give way to a positive integral.
 const CANCELLATION_MAX: f64 = 30.0;
+
+/// Of a stretch: what peaks more narrowly than this takes more panels than an adaptive rule.
+const FINEST: f64 = 1e-7;
 
 /// Of an integrand that is a product of a dozen positive factors and sums.
 const ROUNDINGS: f64 = 12.0 * f64::EPSILON;
@@ -80,9 +84,22 @@ pub fn aligned_rectangles(
     if let Some(corners) = along_x.corner_sum(&along_y, z) {
         return Ok(form_factor(corners / (2.0 * PI * area))?);
     }
-    let across = |v: f64| along_x.between_strips(v, z).unwrap_or(f64::NAN);
-    let integral = along_y.integrate(across, kernel())?;
-    Ok(form_factor(integral.value / (PI * area))?)
+    let integral = if along_x.resolves(z) && along_y.resolves(z) {
+        along_y.graded(
+            |v| {
+                along_x
+                    .between_strips(v, z, |f, rho| Ok(along_x.graded(f, rho, None)))
+                    .unwrap_or(f64::NAN)
+            },
+            z,
+            None,
+        )
+    } else {
+        let adaptive = |f: &dyn Fn(f64) -> f64, _| Ok(along_x.integrate(f, kernel())?.value);
+        let across = |v: f64| along_x.between_strips(v, z, adaptive).unwrap_or(f64::NAN);
+        along_y.integrate(across, kernel())?.value
+    };
+    Ok(form_factor(integral / (PI * area))?)
 }
 
 /// From the floor w x l to the wall h x l that stands on its edge l (Howell C-14). From the edge alone,
@@ -146,8 +163,20 @@ pub fn perpendicular_offset_rectangles(
         let nearest = v.mul_add(v, near).max(f64::MIN_POSITIVE);
         libm::log1p(floor / nearest * (wall / v.mul_add(v, far)))
     };
-    let integral = Overlap::new([y1, y2], [eta1, eta2]).integrate(rays, kernel())?;
-    Ok(form_factor(integral.value / (4.0 * PI * (x2 - x1) * (y2 - y1)))?)
+    let overlap = Overlap::new([y1, y2], [eta1, eta2]);
+    let integral = if x1 > 0.0 || z1 > 0.0 {
+        overlap.graded(rays, libm::hypot(x1, z1), None)
+    } else {
+        // With a common edge the integrand is -2 ln v but for what is smooth up to the widths.
+        let reach = 0.5 * x2.min(z2);
+        let (widest, across) = (x2.max(z2), libm::hypot(x2, z2));
+        let rest = |v: f64| {
+            let (part, slope) = (v / reach, 2.0 * widest / libm::hypot(v, across));
+            libm::log(part.mul_add(part, slope * slope))
+        };
+        overlap.graded(rays, 0.0, Some(Edge { reach, rest: &rest }))
+    };
+    Ok(form_factor(integral / (4.0 * PI * (x2 - x1) * (y2 - y1)))?)
 }
 
 /// From the rectangle a x l to the rectangle b x l that shares its edge l at an angle φ (Howell C-16),
@@ -215,6 +244,37 @@ pub fn wedge_rectangles(
 fn lines_along(longest: f64, edge: f64) -> f64 {
     let ratio = longest / edge;
     longest * libm::atan2(edge, longest) + 0.5 * edge * libm::log1p(ratio * ratio)
+}
+
+/// An integrand that is -2 ln(|v|/reach) + rest(v) near 0, its rest smooth up to twice the reach.
+struct Edge<'a> {
+    reach: f64,
+    rest: &'a dyn Fn(f64) -> f64,
+}
+
+impl Edge<'_> {
+    /// From 0 to that fraction of a stretch, which is no more than the reach.
+    fn add(&self, stretch: &Stretch, fraction: f64, sum: &mut Sum) {
+        let length = stretch.reach.abs() * fraction;
+        // ∫ -2 ln t dt = 2, ∫ -2 t ln t dt = 1/2, and the logarithm of the reach in lengths.
+        let step = stretch.weight_step * fraction;
+        let beyond = 2.0 * libm::log(self.reach / length);
+        sum.add(length * (2.0 * stretch.weight_near + 0.5 * step));
+        sum.add(length * beyond * (stretch.weight_near + 0.5 * step));
+        for (node, weight) in panel() {
+            let level = stretch.weight_near + step * node;
+            sum.add(length * weight * level * (self.rest)(length * node));
+        }
+    }
+}
+
+/// Twelve Gauss nodes and weights on [0, 1].
+fn panel() -> &'static [(f64, f64)] {
+    static RULE: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
+    RULE.get_or_init(|| {
+        let onto_unit = |(node, weight)| (f64::midpoint(1.0, node), 0.5 * weight);
+        gauss_legendre(12).into_iter().map(onto_unit).collect()
+    })
 }
 
 /// Finite, and rising.
@@ -300,6 +360,50 @@ impl Overlap {
         adaptive_between(at, &points, tolerance)
     }
 
+    /// Whether the panels find a peak of that width around 0.
+    fn resolves(&self, width: f64) -> bool {
+        let is_wide = |s: &Stretch| libm::hypot(s.near, width) >= FINEST * s.reach.abs();
+        self.stretches().iter().all(is_wide)
+    }
+
+    /// ∫ weight(v) f(v) dv to rounding, for a positive f that is smooth but for poles or branches at
+    /// ±i `scale` and beyond: Gauss panels no longer than 0.8 of the distance from there to where
+    /// they begin, which twelve nodes integrate to 1e-17 (Bernstein's ellipse has semi-axes that
+    /// add up to 5.5 half panels, and 5.5^-24 is left).
+    fn graded(
+        &self,
+        mut integrand: impl FnMut(f64) -> f64,
+        scale: f64,
+        edge: Option<Edge<'_>>,
+    ) -> f64 {
+        const PANEL: f64 = 0.8;
+        let mut sum = Sum::default();
+        for stretch in self.stretches() {
+            let length = stretch.reach.abs();
+            let mut done = 0.0;
+            if let Some(edge) = edge.as_ref().filter(|_| stretch.near == 0.0) {
+                done = edge.reach.min(length);
+                edge.add(&stretch, done / length, &mut sum);
+            }
+            while done < length {
+                let rest = length - done;
+                let from = stretch.near.abs() + done;
+                let step = (PANEL * libm::hypot(from, scale))
+                    .max(1e-70 * length)
+                    .max(f64::MIN_POSITIVE)
+                    .min(rest);
+                for (node, weight) in panel() {
+                    let part = (done + step * node) / length;
+                    let level = stretch.weight_near + stretch.weight_step * part;
+                    sum.add(step * weight * level * integrand(stretch.near + stretch.reach * part));
+                }
+                // The last panel ends where the stretch does, whatever the roundings.
+                done = if step < rest { done + step } else { length };
+            }
+        }
+        sum.value()
+    }
+
     /// The corner terms of C-13, unless they cancel.
     fn corner_sum(&self, other: &Self, z: f64) -> Option<f64> {
         let (mut sum, mut size) = (Sum::default(), 0.0);
@@ -324,7 +428,12 @@ impl Overlap {
     }
 
     /// ∬ z²/((ξ-x)² + v² + z²)² dξ dx.
-    fn between_strips(&self, v: f64, z: f64) -> Result<f64, EstimateError> {
+    fn between_strips(
+        &self,
+        v: f64,
+        z: f64,
+        integrate: impl Fn(&dyn Fn(f64) -> f64, f64) -> Result<f64, EstimateError>,
+    ) -> Result<f64, EstimateError> {
         let rho = libm::hypot(v, z);
         let factor = z / rho * (z / rho) / (2.0 * rho);
         let terms = self.breaks.map(|u| u * libm::atan2(u, rho));
@@ -337,6 +446,6 @@ impl Overlap {
             let ratio = z / u.mul_add(u, rho * rho);
             ratio * ratio
         };
-        Ok(self.integrate(kernel_at, kernel())?.value)
+        integrate(&kernel_at, rho)
     }
 }
