@@ -26,6 +26,16 @@ pub(crate) fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     a.mul_add(b, -product) + rest
 }
 
+/// Times two to the power, as `libm::scalbn`: one multiplication where the power is a double itself.
+pub(crate) fn scaled(value: f64, exponent: i32) -> f64 {
+    const BIAS: i32 = 1023;
+    match u64::try_from(exponent.saturating_add(BIAS)) {
+        // Neither subnormal nor infinite: the product is rounded once, as it should be.
+        Ok(biased @ 1..2047) => value * f64::from_bits(biased << 52),
+        _ => libm::scalbn(value, exponent),
+    }
+}
+
 /// An unevaluated sum of two doubles, about 32 digits.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DoubleDouble {
@@ -38,10 +48,14 @@ impl DoubleDouble {
         Self { high: value, low: 0.0 }
     }
 
+    /// a + b without loss.
+    pub(crate) fn sum(a: f64, b: f64) -> Self {
+        Self::renormalised(a, b)
+    }
+
     /// a - b without loss.
     pub(crate) fn difference(a: f64, b: f64) -> Self {
-        let (high, low) = two_sum(a, -b);
-        Self { high, low }
+        Self::renormalised(a, -b)
     }
 
     /// Rounded to the nearest double.
@@ -90,7 +104,7 @@ impl DoubleDouble {
 
     /// Times two to the power, exactly.
     pub(crate) fn scaled(self, exponent: i32) -> Self {
-        Self { high: libm::scalbn(self.high, exponent), low: libm::scalbn(self.low, exponent) }
+        Self { high: scaled(self.high, exponent), low: scaled(self.low, exponent) }
     }
 
     fn doubled(self) -> Self {
@@ -181,6 +195,17 @@ mod tests {
         for i in 0..200 {
             let theta = f64::from(i) * core::f64::consts::PI / 200.0;
             assert!((cosine(theta).to_f64() - libm::cos(theta)).abs() < 2e-16);
+        }
+    }
+
+    #[test]
+    fn powers_of_two_scale_as_the_library_does() {
+        let values = [0.0, -1.0, 1.7e308, 5e-324, 2.3e-308, -1.000_000_000_000_000_2e-300, 3.0];
+        for value in values {
+            for exponent in (-2200..2200).step_by(7).chain([-1023, -1022, 1023, 1024]) {
+                let (ours, theirs) = (scaled(value, exponent), libm::scalbn(value, exponent));
+                assert_eq!(ours.to_bits(), theirs.to_bits(), "{value:e} 2^{exponent}");
+            }
         }
     }
 

@@ -38,7 +38,7 @@ pub(crate) fn value(polynomial: &impl Polynomial) -> f64 {
 
 impl Number for DoubleDouble {
     fn from_pair((high, low): Pair) -> Self {
-        Self::from_f64(high).add(Self::from_f64(low))
+        Self::sum(high, low)
     }
 
     fn add(&self, other: &Self) -> Self {

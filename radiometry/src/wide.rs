@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use crate::error_free::{DoubleDouble, difference_of_products};
+use crate::error_free::{DoubleDouble, difference_of_products, scaled};
 
 /// A vector with about 32 digits in each component.
 #[derive(Debug, Clone, Copy)]
@@ -123,5 +123,5 @@ pub(crate) fn unit_exponent(coordinates: impl IntoIterator<Item = f64>) -> i32 {
 
 /// The vector in units of two to the power.
 pub(crate) fn in_units(vector: DVec3, exponent: i32) -> DVec3 {
-    DVec3::from_array(vector.to_array().map(|value| libm::scalbn(value, -exponent)))
+    DVec3::from_array(vector.to_array().map(|value| scaled(value, -exponent)))
 }

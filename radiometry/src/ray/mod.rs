@@ -26,7 +26,7 @@ mod triangle;
 use glam::DVec3;
 
 use crate::domain::{self, DomainError, finite_vector};
-use crate::error_free::two_sum;
+use crate::error_free::{scaled, two_sum};
 use crate::polynomial::{Number, Pair, Polynomial, value};
 
 /// A half-line from an origin, metres, along a direction of any length.
@@ -61,7 +61,7 @@ impl Ray {
         let sizes = sizes.chain(lengths.iter().copied()).chain([self.origin.abs().max_element()]);
         let largest = sizes.fold(0.0, f64::max);
         let exponent = if largest > 0.0 { libm::ilogb(largest) } else { 0 };
-        let scale = |length: f64| libm::scalbn(length, -exponent);
+        let scale = |length: f64| scaled(length, -exponent);
         for length in lengths {
             *length = scale(*length);
         }
