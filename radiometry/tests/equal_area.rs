@@ -134,6 +134,25 @@ fn it_does_not_matter_how_fine_a_map_is_drawn() {
 }
 
 #[test]
+fn contours_find_what_integrals_find_to_the_last_digits() {
+    // Nothing meets a tolerance of 0: every pixel on the horizon is integrated, and the best is said.
+    let without_end = Tolerance::new(0.0, 0.0, 100_000_000).unwrap();
+    for side in [18, 40, 150] {
+        let map = map(side, &Dice(41).radiances(side));
+        for normal in normals().into_iter().step_by(if side > 100 { 4 } else { 1 }) {
+            let quick = map.irradiance(normal, Tolerance::from_relative(1e-13).unwrap()).unwrap();
+            let unmet = map.irradiance(normal, without_end).unwrap_err();
+            let EstimateError::Unmet { estimate: fine, .. } = unmet else { panic!("{unmet}") };
+            let error = (quick.value - fine.value).abs();
+            let said = format!("{side}, {normal}: {quick:?}, {fine:?}, off by {error:e}");
+            assert!(error <= quick.error_bound + fine.error_bound, "{said}");
+            assert!(error <= 2e-15 * fine.value, "{said}");
+            assert!(side < 100 || 2 * quick.evaluations < fine.evaluations, "{said}");
+        }
+    }
+}
+
+#[test]
 fn what_has_set_is_dark_and_a_budget_too_small_says_so() {
     let side = 64;
     let mut radiances = vec![0.0; side * side];

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::folded::Pixel;
-use super::{EnvironmentError, checked};
+use super::{EnvironmentError, checked, contour};
 use crate::direction::normalised;
 use crate::domain::{DomainError, finite_vector};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
@@ -104,8 +104,9 @@ impl<W: Weighting> EqualArea<W> {
     }
 
     /// Irradiance ∫ L cos θ dω, W·m⁻² (of a map of luminance lx), on a receiver with a normal of any
-    /// length but 0. Pixels above the horizon are known to rounding; what the horizon leaves of a pixel
-    /// is integrated, and the tolerance is for the whole.
+    /// length but 0. Pixels above the horizon are known to rounding, and what the horizon leaves of the
+    /// others to some ulp of the whole; where that is not enough it is integrated, and the tolerance
+    /// is for the whole.
     pub fn irradiance(
         &self,
         normal: DVec3,
@@ -113,28 +114,60 @@ impl<W: Weighting> EqualArea<W> {
     ) -> Result<Estimate, EstimateError> {
         let normal = unit("normal", normal)?;
         let (above, cut) = self.sorted(normal);
-        let mut bound = above.error_bound;
+        let quick = self.with_contours(above, &cut, normal, tolerance)?;
+        if quick.meets(tolerance) {
+            return Ok(quick);
+        }
+        let fine = self.with_integrals(above, &cut, normal, tolerance)?;
+        let best = if fine.error_bound < quick.error_bound { fine } else { quick };
+        best.within(tolerance)
+    }
+
+    /// What is above the horizon, and of the other pixels what their contours tell.
+    fn with_contours(
+        &self,
+        above: Estimate,
+        cut: &[Pixel],
+        normal: DVec3,
+        tolerance: Tolerance,
+    ) -> Result<Estimate, EstimateError> {
+        let (mut total, mut left) = (Total::new(above), Vec::new());
+        for pixel in cut {
+            let folded = pixel.folded(normal);
+            let moment = self.moments[pixel.i * self.half + pixel.j];
+            let error_bound = ULPS * f64::EPSILON * self.solid_angle_sr();
+            let whole = Estimate { value: folded.dot(moment), error_bound, evaluations: 0 };
+            match contour::visible(pixel, self.half, whole, folded) {
+                Some(seen) => total.add(seen, pixel.radiance),
+                None => left.push(*pixel),
+            }
+        }
+        self.with_integrals(total.estimate()?, &left, normal, tolerance)
+    }
+
+    /// The same with integrals over the pixels, each to its share of the tolerance.
+    fn with_integrals(
+        &self,
+        above: Estimate,
+        cut: &[Pixel],
+        normal: DVec3,
+        tolerance: Tolerance,
+    ) -> Result<Estimate, EstimateError> {
         let bright: f64 = cut.iter().map(|pixel| pixel.radiance).sum();
         let share = tolerance.allowed(above.value) / bright;
-        let (mut sum, mut evaluations) = (Sum::default(), 0);
-        sum.add(above.value);
+        let mut total = Total::new(above);
         for pixel in cut {
-            let budget = tolerance.budget().saturating_sub(evaluations).max(1);
+            let budget = tolerance.budget().saturating_sub(total.evaluations).max(1);
             let wanted =
                 Tolerance::new(0.5 * tolerance.relative(), (0.5 * share).min(f64::MAX), budget)?;
-            let seen = match self.visible(&pixel, normal, wanted) {
-                Ok(estimate) | Err(EstimateError::Unmet { estimate, .. }) => estimate,
+            match self.visible(pixel, normal, wanted) {
+                Ok(seen) | Err(EstimateError::Unmet { estimate: seen, .. }) => {
+                    total.add(seen, pixel.radiance);
+                }
                 Err(error) => return Err(error),
-            };
-            sum.add(pixel.radiance * seen.value);
-            bound += pixel.radiance * seen.error_bound;
-            evaluations += seen.evaluations;
+            }
         }
-        let (value, error_bound) = (sum.value().max(0.0), bound);
-        if !value.is_finite() || !error_bound.is_finite() {
-            return Err(DomainError::Overflow { result: "irradiance" }.into());
-        }
-        Estimate { value, error_bound, evaluations }.within(tolerance)
+        Ok(total.estimate()?)
     }
 
     /// The irradiance from the pixels wholly above the horizon, and those that it may cut.
@@ -143,23 +176,24 @@ impl<W: Weighting> EqualArea<W> {
         let side = self.side();
         let doubtful = ACROSS / side as f64;
         let (mut sum, mut bright, mut cut) = (Sum::default(), Sum::default(), Vec::new());
-        for (index, radiance) in self.radiance.iter().enumerate().filter(|(_, l)| **l > 0.0) {
-            let pixel = Pixel::new(index / side, index % side, self.half, *radiance);
-            let moment = self.moments[pixel.i * self.half + pixel.j];
-            let seen = normal.x * moment.x * pixel.sign_x
-                + normal.y * moment.y * pixel.sign_y
-                + normal.z * moment.z;
-            if seen > doubtful * solid_angle {
-                sum.add(radiance * seen);
-                bright.add(*radiance);
-            } else if seen >= -doubtful * solid_angle {
-                // From its middle no direction is farther than half of that.
-                let elevation = normal.dot(pixel.middle(self.half));
-                if elevation > 0.5 * doubtful {
+        for (row, radiances) in self.radiance.chunks(side).enumerate() {
+            for (column, radiance) in radiances.iter().enumerate().filter(|(_, l)| **l > 0.0) {
+                let pixel = Pixel::new(row, column, self.half, *radiance);
+                let moment = self.moments[pixel.i * self.half + pixel.j];
+                let seen = pixel.folded(normal).dot(moment);
+                let is_above = seen > doubtful * solid_angle || {
+                    let is_below = seen < -doubtful * solid_angle;
+                    // From its middle no direction is farther than half of that.
+                    let elevation =
+                        if is_below { -1.0 } else { normal.dot(pixel.middle(self.half)) };
+                    if elevation.abs() <= 0.5 * doubtful {
+                        cut.push(pixel);
+                    }
+                    elevation > 0.5 * doubtful
+                };
+                if is_above {
                     sum.add(radiance * seen);
                     bright.add(*radiance);
-                } else if elevation >= -0.5 * doubtful {
-                    cut.push(pixel);
                 }
             }
         }
@@ -174,7 +208,7 @@ impl<W: Weighting> EqualArea<W> {
         normal: DVec3,
         tolerance: Tolerance,
     ) -> Result<Estimate, EstimateError> {
-        let folded = DVec3::new(normal.x * pixel.sign_x, normal.y * pixel.sign_y, normal.z);
+        let folded = pixel.folded(normal);
         let triangles = pixel.triangles(self.half);
         let over = |t: f64| {
             let (mut value, mut noise) = (0.0, 0.0);
@@ -193,6 +227,36 @@ impl<W: Weighting> EqualArea<W> {
         points.sort_by(f64::total_cmp);
         points.dedup();
         adaptive_noisy(over, &points, tolerance)
+    }
+}
+
+/// An irradiance that grows by pixels.
+struct Total {
+    sum: Sum,
+    error_bound: f64,
+    evaluations: usize,
+}
+
+impl Total {
+    fn new(above: Estimate) -> Self {
+        let mut sum = Sum::default();
+        sum.add(above.value);
+        Self { sum, error_bound: above.error_bound, evaluations: above.evaluations }
+    }
+
+    fn add(&mut self, seen: Estimate, radiance: f64) {
+        self.sum.add(radiance * seen.value);
+        self.error_bound += radiance * seen.error_bound;
+        self.evaluations += seen.evaluations;
+    }
+
+    fn estimate(&self) -> Result<Estimate, DomainError> {
+        let (value, error_bound) = (self.sum.value().max(0.0), self.error_bound);
+        if value.is_finite() && error_bound.is_finite() {
+            Ok(Estimate { value, error_bound, evaluations: self.evaluations })
+        } else {
+            Err(DomainError::Overflow { result: "irradiance" })
+        }
     }
 }
 

@@ -41,6 +41,11 @@ impl Pixel {
         Self { sign_x, sign_y, i, j, radiance }
     }
 
+    /// A normal, folded as the pixel.
+    pub(super) fn folded(&self, normal: DVec3) -> DVec3 {
+        DVec3::new(normal.x * self.sign_x, normal.y * self.sign_y, normal.z)
+    }
+
     /// The direction of its middle.
     pub(super) fn middle(&self, half: usize) -> DVec3 {
         let at = |index: usize| (index as f64 + 0.5) / half as f64;
@@ -135,7 +140,7 @@ impl Triangle {
             for k in 1..=LOOKS {
                 let to = (look(k), elevation(look(k)));
                 if from.1 * to.1 < 0.0 {
-                    points.push(root(from, to, &elevation));
+                    points.push(root(from, to, 0.0, &elevation));
                 }
                 from = to;
             }
@@ -153,14 +158,19 @@ impl Triangle {
     }
 }
 
-/// Where a function between two places of opposite sign is zero: false position with the Illinois
-/// correction (Dowell and Jarratt 1971).
-fn root(mut from: (f64, f64), mut to: (f64, f64), f: &impl Fn(f64) -> f64) -> f64 {
+/// Where a function between two places of opposite sign is zero, or no farther from it than is enough:
+/// false position with the Illinois correction (Dowell and Jarratt 1971).
+pub(super) fn root(
+    mut from: (f64, f64),
+    mut to: (f64, f64),
+    enough: f64,
+    f: &impl Fn(f64) -> f64,
+) -> f64 {
     const STEPS: u32 = 60;
     for _ in 0..STEPS {
         let t = (from.0 * to.1 - to.0 * from.1) / (to.1 - from.1);
         let at = (t, f(t));
-        if at.1 == 0.0 || (to.0 - from.0).abs() <= 4.0 * f64::EPSILON * t.abs() {
+        if at.1.abs() <= enough || (to.0 - from.0).abs() <= 4.0 * f64::EPSILON * t.abs() {
             return t;
         }
         if at.1 * to.1 < 0.0 {

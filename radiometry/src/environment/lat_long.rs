@@ -13,6 +13,7 @@ use crate::domain::{DomainError, direction};
 use crate::estimate::Estimate;
 use crate::quadrature::Sum;
 use crate::quantity::{Radiance, Radiometric, SolidAngle, Weighting};
+use crate::transcendental::less_its_sine;
 
 /// Rows that are summed up once and for all.
 const BLOCK: usize = 16;
@@ -317,16 +318,4 @@ fn ring(row: usize, rows: usize) -> Weighed {
         along: sin_step * middle.sin * if place == rows { 0.0 } else { cos },
         solid: 2.0 * middle.sin * libm::sin(0.5 * step),
     }
-}
-
-/// x - sin x for x >= 0, by its series where it is small.
-fn less_its_sine(x: f64) -> f64 {
-    if x > 1.0 {
-        return x - libm::sin(x);
-    }
-    let square = x * x;
-    let tail = [272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0]
-        .into_iter()
-        .fold(1.0, |series, next| 1.0 - square / next * series);
-    square * x / 6.0 * tail
 }

@@ -6,6 +6,7 @@
 //! as everywhere. For lit samples in the simulator, and the lecture's page on environment maps: the
 //! two-dimensional chart (θ, φ) with dΩ̃ = cos θ dω at a point.
 
+mod contour;
 mod equal_area;
 mod folded;
 mod horizon;

@@ -9,6 +9,7 @@ use crate::quadrature::adaptive_between;
 use crate::quantity::FormFactor;
 use crate::solid_angle;
 use crate::throughput::CoaxialDisks;
+use crate::transcendental::less_its_sine;
 
 /// From disk 1 to disk 2, parallel and on one axis (Howell C-41); see
 /// [`CoaxialDisks::form_factor`]. A disk 1 of no radius is a point that looks along the axis.
@@ -230,16 +231,4 @@ fn lens(radius_1: f64, radius_2: f64, rho: f64, rim: f64, inner: f64) -> f64 {
         radius * radius * 0.5 * less_its_sine(4.0 * half)
     };
     segment(radius_1, radius_1 <= radius_2) + segment(radius_2, radius_1 > radius_2)
-}
-
-/// x - sin x, which cancels for small x.
-fn less_its_sine(x: f64) -> f64 {
-    if x > 1.0 {
-        return x - libm::sin(x);
-    }
-    let square = x * x;
-    let tail = [342.0, 272.0, 210.0, 156.0, 110.0, 72.0, 42.0, 20.0]
-        .into_iter()
-        .fold(1.0, |series, next| 1.0 - square / next * series);
-    square * x / 6.0 * tail
 }
