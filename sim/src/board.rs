@@ -83,23 +83,39 @@ impl SimulatedBoard {
         self.axes.get_mut(axis)
     }
 
-    /// The light's current, amperes. At rest it is worked out once a dwell.
+    /// The light's current over an ADC reading, amperes. At rest it is worked out once a dwell.
     fn photocurrent_a(&mut self, now: Instant) -> f64 {
         if let Some(current_a) = self.dwell.current_a {
             return current_a;
         }
+        let rests_at = self.axes.iter().map(Axis::rests_at).max();
+        let begin = earlier(now, self.reading_s);
         let current_a = match self.dwell.illumination.shutter {
             Shutter::Closed => 0.0,
+            Shutter::Open if rests_at.is_none_or(|at| at <= begin) => self.light_a(now),
             Shutter::Open => {
-                let radiance = self.compiled.optics.radiance(&self.detector_axis(now));
-                radiance * self.compiled.current_per_radiance
+                let moments = self.compiled.moments.iter();
+                let at = |before_end: f64| earlier(now, before_end * self.reading_s);
+                moments.map(|moment| moment.weight * self.light_a(at(moment.before_end))).sum()
             }
         };
-        if self.axes.iter().all(|axis| axis.rests_at() <= now) {
+        if rests_at.is_none_or(|at| at <= begin) {
             self.dwell.current_a = Some(current_a);
         }
         current_a
     }
+
+    /// At a moment, amperes.
+    fn light_a(&self, now: Instant) -> f64 {
+        let radiance = self.compiled.optics.radiance(&self.detector_axis(now));
+        radiance * self.compiled.current_per_radiance
+    }
+}
+
+/// A moment so many seconds earlier, to the microsecond.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a part of an ADC reading
+fn earlier(now: Instant, by_s: f64) -> Instant {
+    Instant::from_micros(now.micros().saturating_sub(libm::round(by_s * 1e6) as u64))
 }
 
 impl Board for SimulatedBoard {

@@ -15,7 +15,7 @@ use crate::check::check;
 use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
 use crate::field::Field;
-use crate::mechanics::{self, AxisTruth, Kinematics};
+use crate::mechanics::{self, AxisTruth, Kinematics, Moment};
 use crate::optics::{self, Optics};
 use crate::stage::Stages;
 use crate::time;
@@ -30,6 +30,8 @@ pub struct Compiled {
     pub(crate) seed: u64,
     pub(crate) axes: [AxisTruth; 4],
     pub(crate) kinematics: Arc<dyn Kinematics>,
+    /// When a reading looks while the axes move.
+    pub(crate) moments: Vec<Moment>,
     pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
     pub(crate) current_per_radiance: f64,
@@ -136,6 +138,7 @@ pub fn compile(
         amplifier: draw_amplifier(&departing, terms.seed)?,
         axes: mechanics::axes(&nominal, &simulated, terms.seed, &chosen),
         kinematics: mechanics::kinematics(&simulated, terms.seed, &chosen),
+        moments: mechanics::moments(&nominal, &simulated, &chosen),
         scene,
         nominal,
         simulated,

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use super::flaws::{
-    AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, MISSED_STEPS, MissedSteps, NON_ORTHOGONALITY,
-    Ringing, SETTLE_RINGING, WOBBLE,
+    AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, MISSED_STEPS, MOTION_SMEAR, MissedSteps,
+    NON_ORTHOGONALITY, Ringing, SETTLE_RINGING, WOBBLE,
 };
 use super::geometry::{Kinematics, Misaligned, Perfect};
 use super::ringing::Rings;
+use super::smear::{self, Moment};
 use super::weigh::{Departing, Joints, Trials};
 use super::{AxisTruth, Misalignment, Uncertain};
 use crate::compile::Setting;
@@ -20,10 +21,14 @@ use crate::{Nominal, NominalAxis, Simulated};
 /// ADC readings of a dwell that a ringing axis is tried at, at most.
 const RINGING_TRIALS: u32 = 64;
 
+/// ADC readings of a dwell that smear is summed over, at most.
+const SMEAR_READINGS: f64 = 1e5;
+
 /// The axes' candidates, those of how they meet, and the limit switches'.
 pub(crate) fn candidates(setting: &Setting<'_>) -> Vec<Candidate> {
     let weighing = Weighing { setting, trials: core::cell::OnceCell::new() };
     let mut candidates: Vec<Candidate> = (0..4).flat_map(|i| weighing.of_axis(i)).collect();
+    candidates.push(weighing.of_smear());
     candidates.extend(weighing.of_misalignment());
     let margin = setting.simulated.limit_margin;
     candidates.push(Candidate::of_key(
@@ -65,6 +70,21 @@ pub(crate) fn axes(
 pub(crate) fn kinematics(simulated: &Simulated, seed: u64, chosen: &Chosen) -> Arc<dyn Kinematics> {
     let drawn = simulated.misalignment.drawn(seed, |effect| chosen.has(effect));
     if drawn == Misaligned::default() { Arc::new(Perfect) } else { Arc::new(drawn) }
+}
+
+/// The moments of an ADC reading at which the light is looked at while an axis is not at rest.
+pub(crate) fn moments(nominal: &Nominal, simulated: &Simulated, chosen: &Chosen) -> Vec<Moment> {
+    if chosen.has(MOTION_SMEAR) {
+        smear::moments(fastest_hz(simulated), 1.0 / f64::from(nominal.detector.adc_rate_hz))
+    } else {
+        vec![smear::END]
+    }
+}
+
+/// Of all that rings, hertz.
+fn fastest_hz(simulated: &Simulated) -> f64 {
+    let ringing = simulated.axes.iter().filter_map(|flaws| flaws.ringing);
+    ringing.map(|ringing| ringing.frequency_hz).fold(0.0, f64::max)
 }
 
 /// The poses are put together when the first effect asks for them.
@@ -225,6 +245,43 @@ impl Weighing<'_> {
             off.collect()
         };
         self.largest(&[&|joints| moved(joints, 1.0), &|joints| moved(joints, -1.0)])
+    }
+
+    /// Of the axes that still ring when their stated time to settle is over.
+    fn of_smear(&self) -> Candidate {
+        let Setting { nominal, simulated, terms, .. } = self.setting;
+        let reading_s = 1.0 / f64::from(nominal.detector.adc_rate_hz);
+        let moments = smear::moments(fastest_hz(simulated), reading_s);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
+        let n = (terms.dwell_s / reading_s).clamp(1.0, SMEAR_READINGS) as u32;
+        let mut names = Vec::new();
+        let mut influence = 0.0;
+        for (i, (axis, flaws)) in nominal.axes.iter().zip(&simulated.axes).enumerate() {
+            let Some(ringing) = flaws.ringing.filter(|ringing| ringing.amplitude > 0.0) else {
+                continue;
+            };
+            let rings = Rings::new(&ringing, axis.counts_per_unit);
+            if rings.lasts_s() <= axis.settle_s {
+                continue;
+            }
+            names.push(AXIS_NAMES[i]);
+            let change = smear::change(&rings, &moments, axis.settle_s, reading_s, n);
+            if let Influence::Relative(of_axis) = self.off(i, ringing.amplitude * change) {
+                influence += of_axis;
+            }
+        }
+        let key = if names.is_empty() {
+            "dwells are taken at rest, and no axis rings beyond its time to settle".to_owned()
+        } else {
+            format!("{} rings beyond its time to settle", names.join(", "))
+        };
+        Candidate::of_key(
+            MOTION_SMEAR,
+            &key,
+            !names.is_empty(),
+            Influence::Relative(influence),
+            "until the axes rest, each ADC reading is the mean over the places passed in its time",
+        )
     }
 
     fn of_misalignment(&self) -> Vec<Candidate> {

@@ -94,6 +94,7 @@ pub(super) const BACKLASH: &str = "backlash";
 pub(super) const ENCODER_ERROR: &str = "encoder-error";
 pub(super) const SETTLE_RINGING: &str = "settle-ringing";
 pub(super) const MISSED_STEPS: &str = "missed-steps";
+pub(super) const MOTION_SMEAR: &str = "motion-smear";
 
 impl Uncertain {
     /// `key` and `u_key`; zero where absent.

@@ -12,13 +12,15 @@ mod geometry;
 mod play;
 mod ringing;
 mod scale;
+mod smear;
 mod weigh;
 
 pub use flaws::{AxisFlaws, EncoderError, Misalignment, MissedSteps, Ringing, Uncertain};
 
 pub(crate) use axis::{Axis, AxisTruth};
-pub(crate) use effects::{axes, candidates, kinematics};
+pub(crate) use effects::{axes, candidates, kinematics, moments};
 pub(crate) use geometry::Kinematics;
+pub(crate) use smear::Moment;
 
 use crate::optics;
 

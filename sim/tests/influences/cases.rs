@@ -40,7 +40,7 @@ pub(crate) enum Measure {
 
 pub(crate) type Draw = fn(&mut Dice) -> Case;
 
-pub(crate) const EFFECTS: [Draw; 24] = [
+pub(crate) const EFFECTS: [Draw; 25] = [
     stray_light,
     dark_current,
     dark_drift,
@@ -65,6 +65,7 @@ pub(crate) const EFFECTS: [Draw; 24] = [
     axis_offset,
     x_zero,
     x_backlash,
+    motion_smear,
 ];
 
 /// `SplitMix64` (Steele, Lea, Flood 2014).
@@ -353,5 +354,14 @@ fn x_backlash(dice: &mut Dice) -> Case {
     let play_m = dice.decades(-4.0, -2.5);
     let mut case = of_outline("x-backlash", dice, play_m, Measure::Sides);
     case.simulated.axes[2].backlash = play_m;
+    case
+}
+
+fn motion_smear(dice: &mut Dice) -> Case {
+    let mut case = ringing(dice);
+    case.effect = "motion-smear";
+    case.nominal.detector.adc_rate_hz = RATE_HZ;
+    // What rings is in, however little it matters.
+    case.terms.tolerance = Some(0.0);
     case
 }
