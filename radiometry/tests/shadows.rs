@@ -123,6 +123,21 @@ proptest! {
         }
     }
 
+    /// A body before a source by itself may be dealt with at a glance; two are looked at in full.
+    #[test]
+    fn the_same_body_twice_hides_what_it_hides_once(
+        source in source(), body in occluder(), point in vector(0.3),
+    ) {
+        let at = up(point);
+        let once = seen(&at, &source, std::slice::from_ref(&body));
+        let twice = seen(&at, &source, &[body.clone(), body]);
+        prop_assert_eq!(once.is_some(), twice.is_some());
+        if let (Some(once), Some(twice)) = (once, twice) {
+            let bound = once.error_bound + twice.error_bound;
+            prop_assert!((once.value - twice.value).abs() <= bound, "{:?} {:?}", once, twice);
+        }
+    }
+
     #[test]
     fn what_is_said_of_a_region_holds_at_its_points(
         source in source(), body in occluder(), region in region(),

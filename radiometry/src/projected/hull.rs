@@ -91,7 +91,7 @@ impl Hull {
 
     /// How far from the hull what it stands for may be: a polygon's vertices need not be in one plane
     /// exactly.
-    fn slack(&self) -> f64 {
+    pub(super) fn slack(&self) -> f64 {
         match self {
             Self::Points(points) => {
                 4e-6 * points.iter().map(|x| length(*x - points[0])).fold(0.0, f64::max)
@@ -118,9 +118,9 @@ pub(super) fn disk_points(disk: &Disk, count: usize, factor: f64) -> Vec<DVec3> 
 }
 
 /// Whether a plane is found between a body and the hull of region and source: the way to their nearest
-/// points (Gilbert 1966), stopped as soon as the plane across it separates. Lengths are at most 2.
-pub(super) fn are_apart(region: &[DVec3], source: &Hull, body: &Hull) -> bool {
-    const STEPS: usize = 300;
+/// points (Gilbert 1966), stopped as soon as the plane across it separates, or after so many steps.
+/// Lengths are at most 2.
+pub(super) fn are_apart(region: &[DVec3], source: &Hull, body: &Hull, steps: u32) -> bool {
     const ROUNDING: f64 = 1e-13;
     let margin = ROUNDING + body.slack() + source.slack();
     let lowest = |direction: DVec3| {
@@ -130,7 +130,7 @@ pub(super) fn are_apart(region: &[DVec3], source: &Hull, body: &Hull) -> bool {
         lit - body.lowest(-direction)
     };
     let mut nearest = lowest(source.middle() - body.middle());
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         let size = length(nearest);
         if size <= margin {
             return false;

@@ -124,6 +124,24 @@ impl Along {
         Self { coefficients, is_zero }
     }
 
+    /// Whether the curve is nowhere near the limit, wherever it may begin and end: by the sizes of the
+    /// Fourier series' terms.
+    pub(super) fn is_clear(&self) -> bool {
+        const MARGIN: f64 = 1e-12;
+        let [k0, k1, k2, k3, k4] = self.coefficients;
+        let mean = k0 + k2 + 1.5 * k4;
+        let (once, twice) = ([k1 + k3, k2 + 2.0 * k4], [k3 / 2.0, k4 / 2.0]);
+        let size = |[a, b]: [f64; 2]| a.mul_add(a, b * b).sqrt();
+        let terms: f64 = self.coefficients.iter().map(|k| k.abs()).sum();
+        mean.abs() > size(once) + size(twice) + MARGIN * terms
+    }
+
+    /// Where a plane's function turns: there and half a turn on, and nowhere else. None of another's.
+    pub(super) fn turning_point(&self) -> Option<f64> {
+        let [_, k1, k2, k3, k4] = self.coefficients;
+        (k3 == 0.0 && k4 == 0.0).then(|| libm::atan2(-k1, k2))
+    }
+
     pub(super) fn value_and_slope(&self, t: f64) -> (f64, f64) {
         let [k0, k1, k2, k3, k4] = self.coefficients;
         let (sin_half, cos_half) = libm::sincos(t / 2.0);

@@ -6,6 +6,7 @@
 //! quadrature. It knows no radiance and no rig. For the pages on projected solid angle, Lambert's
 //! formula, umbra and penumbra, and for `irradiance` next door.
 
+mod around;
 mod body;
 mod disk;
 mod hull;

@@ -8,7 +8,7 @@
 
 use super::Receiver;
 use super::body::{Occluder, Source, in_one_unit};
-use super::scene::Scene;
+use super::scene::{Before, Scene};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 
 /// Projected solid angle, sr, of the part of a source above the horizon that an opaque body leaves
@@ -66,9 +66,10 @@ pub fn occluded_by(
     let whole = source.whole(receiver)?;
     let (receiver, source, occluders) = in_one_unit(receiver, source, occluders)?;
     let unoccluded = Estimate::closed(whole, 1000.0);
-    let scene = Scene::new(&receiver, &source, &occluders)?;
-    let Some(scene) = scene.filter(|_| whole > 0.0) else {
-        return Ok(unoccluded);
+    let scene = match Scene::new(&receiver, &source, &occluders)? {
+        Before::Bodies(scene) if whole > 0.0 => scene,
+        Before::Umbra if whole > 0.0 => return Ok(Estimate::closed(0.0, 0.0)),
+        _ => return Ok(unoccluded),
     };
     let visible = scene.visible()?;
     let estimate = if visible.is_shadowed {

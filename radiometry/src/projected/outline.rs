@@ -184,14 +184,19 @@ impl Curve {
     pub(super) fn crossings(&self, limit: &Limit) -> Vec<f64> {
         const TOUCHING: f64 = 1e-6;
         let along = limit.along(self);
-        if along.is_zero {
+        if along.is_zero || along.is_clear() {
             return Vec::new();
         }
         let speed = self.sine.abs().max_element() / self.base.abs().max_element();
         let search = Search { along, close: 1e-8 / speed.max(1.0) };
         let mut found = Vec::new();
-        let mut halvings_left = HALVINGS_MAX;
-        search.run([self.start, self.start + self.turn], &mut halvings_left, &mut found);
+        let ends = [self.start, self.start + self.turn];
+        if let Some(turning) = along.turning_point() {
+            search.run_between(turning, ends, &mut found);
+        } else {
+            let mut halvings_left = HALVINGS_MAX;
+            search.run(ends, &mut halvings_left, &mut found);
+        }
         if found.is_empty() {
             return found;
         }
@@ -235,6 +240,19 @@ struct Search {
 }
 
 impl Search {
+    /// Looks where the function rises or falls throughout: between the turning points, which are half a
+    /// turn apart.
+    fn run_between(&self, turning: f64, [start, end]: [f64; 2], found: &mut Vec<f64>) {
+        let at = |t: f64| (t, self.along.value_and_slope(t).0);
+        let mut from = at(start);
+        let turns = (-2..=3).map(|half| f64::from(half).mul_add(PI, turning));
+        for t in turns.filter(|t| start < *t && *t < end).chain([end]) {
+            let to = at(t);
+            found.extend(self.root(from, to));
+            from = to;
+        }
+    }
+
     /// Halves an interval until it holds no crossing or exactly one, by bounds of the function: none
     /// is missed but two that are too close.
     fn run(&self, [from, to]: [f64; 2], halvings_left: &mut u32, found: &mut Vec<f64>) {
@@ -247,7 +265,8 @@ impl Search {
             return;
         }
         if slope.abs() > bend * half {
-            found.extend(self.root([from, to]));
+            let at = |t: f64| (t, self.along.value_and_slope(t).0);
+            found.extend(self.root(at(from), at(to)));
         } else if half > self.close && *halvings_left > 0 {
             *halvings_left -= 1;
             self.run([from, middle], halvings_left, found);
@@ -257,11 +276,11 @@ impl Search {
 
     /// The crossing in an interval where the function rises or falls throughout, if there is one: by
     /// Newton's method, by halving where that leaves the bracket.
-    fn root(&self, [mut from, mut to]: [f64; 2]) -> Option<f64> {
-        let sign = self.along.value_and_slope(from).0;
-        if sign * self.along.value_and_slope(to).0 > 0.0 {
+    fn root(&self, (from, sign): (f64, f64), (to, other): (f64, f64)) -> Option<f64> {
+        if sign * other > 0.0 {
             return None;
         }
+        let (mut from, mut to) = (from, to);
         let mut t = f64::midpoint(from, to);
         for _ in 0..80 {
             let (value, slope) = self.along.value_and_slope(t);

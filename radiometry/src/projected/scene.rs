@@ -6,13 +6,14 @@ use core::cmp::Ordering;
 use glam::DVec3;
 
 use super::Receiver;
+use super::around::Around;
 use super::body::{Occluder, Source};
 use super::limit::Limit;
 use super::outline::Curve;
 use super::pierced::is_pierced;
 use super::seen::Seen;
 use super::view::View;
-use crate::direction::{angle_between, normalised};
+use crate::direction::normalised;
 use crate::domain::DomainError;
 use crate::estimate::{Estimate, EstimateError, Tolerance};
 use crate::quadrature::Sum;
@@ -25,10 +26,22 @@ const BESIDE: f64 = 1e-12;
 /// Where on an arc: anywhere but at its middle, where symmetric outlines touch without crossing.
 const LOOK_AT: f64 = 0.381_966;
 
+/// What stands before a source.
+pub(super) enum Before {
+    /// Nothing that hides any of it, or it is not seen.
+    Nothing,
+    /// A body that hides all of it.
+    Umbra,
+    /// Bodies that have to be looked at.
+    Bodies(Scene),
+}
+
 pub(super) struct Scene {
     view: View,
     source: Seen,
     hiding: Vec<Seen>,
+    /// Where the source and a body, both flat, are equally far away.
+    levels: Vec<Limit>,
     /// Whether the first of these is the horizon.
     has_horizon: bool,
 }
@@ -45,19 +58,22 @@ pub(super) struct Visible<'a> {
 }
 
 impl Scene {
-    /// All lengths in one unit. None if the source is not seen, or nothing could hide it.
+    /// All lengths in one unit.
     pub(super) fn new(
         receiver: &Receiver,
         source: &Source,
         occluders: &[Occluder],
-    ) -> Result<Option<Self>, DomainError> {
-        let Some((middle, extent)) = middle_and_extent(receiver, source) else { return Ok(None) };
-        let occluders: Vec<&Occluder> = occluders
-            .iter()
-            .filter(|occluder| !is_beside(receiver.point_m(), middle.to_vec(), extent, occluder))
-            .collect();
-        if occluders.is_empty() {
-            return Ok(None);
+    ) -> Result<Before, DomainError> {
+        let Some((middle, extent)) = middle_and_extent(receiver, source) else {
+            return Ok(Before::Nothing);
+        };
+        let cone = Around::new(receiver.point_m(), source, middle.to_vec(), extent);
+        let occluders: Vec<&Occluder> =
+            occluders.iter().filter(|occluder| !cone.is_clear_of(occluder)).collect();
+        match occluders[..] {
+            [] => return Ok(Before::Nothing),
+            [one] if cone.is_behind(one) => return Ok(Before::Umbra),
+            _ => {}
         }
         let view = View::towards(receiver.point_m(), receiver.normal(), middle, extent)
             .ok_or(DomainError::Lost { result: "projected solid angle (sr)" })?;
@@ -79,16 +95,17 @@ impl Scene {
                 return Err(DomainError::Interpenetrating);
             }
         }
-        let Some(source) = shining else { return Ok(None) };
+        let Some(source) = shining else { return Ok(Before::Nothing) };
         if hiding.is_empty() {
-            return Ok(None);
+            return Ok(Before::Nothing);
         }
         let horizon = Seen::below(&view, receiver.normal()).filter(|below| {
             source.curves.iter().any(|c| !c.crossings(&below.limits[0]).is_empty())
         });
         let has_horizon = horizon.is_some();
         hiding.splice(0..0, horizon);
-        Ok(Some(Self { view, source, hiding, has_horizon }))
+        let levels = hiding.iter().filter_map(|seen| source.level_with(seen)).collect();
+        Ok(Before::Bodies(Self { view, source, hiding, levels, has_horizon }))
     }
 
     /// Refused: a body that is in front of the source and behind.
@@ -150,8 +167,8 @@ impl Scene {
             if owner != Some(body) {
                 seen.limits.iter().for_each(&mut cross);
             }
-            self.source.level_with(seen).iter().for_each(&mut cross);
         }
+        self.levels.iter().for_each(&mut cross);
         ends.sort_by(f64::total_cmp);
         if let (true, Some(first)) = (curve.is_closed(), ends.first().copied()) {
             // Once round, from the first crossing to itself.
@@ -239,44 +256,6 @@ impl Visible<'_> {
         }
         Ok(Estimate { value, error_bound, evaluations })
     }
-}
-
-/// Whether the cone around an occluder and the one around the source are certainly apart, so that
-/// the body can neither hide anything of it nor reach into it.
-fn is_beside(point: DVec3, middle: DVec3, extent: f64, occluder: &Occluder) -> bool {
-    /// More than rounding, less than matters.
-    const MARGIN: f64 = 1e-9;
-    /// Of coordinates up to 2.
-    const ROUNDING: f64 = 8.0 * f64::EPSILON;
-    // Half of the circle, at least, is no cone.
-    if extent >= 1.0 {
-        return false;
-    }
-    let (center, radius) = match occluder {
-        Occluder::Disk(disk) => (disk.center_m(), disk.radius_m()),
-        Occluder::Sphere(ball) => (ball.center_m(), ball.radius_m()),
-        Occluder::Polygon(polygon) => {
-            let corners = polygon.vertices();
-            let center = corners.iter().sum::<DVec3>() / corners.len() as f64;
-            (center, corners.iter().map(|c| length(*c - center)).fold(0.0, f64::max))
-        }
-        Occluder::HalfPlane(edge) => {
-            let (x, z) = (edge.x_max_m() - point.x, edge.z_m() - point.z);
-            let size = libm::hypot(x, z);
-            // Inwards from the edge.
-            let across = (x * middle.z - z * middle.x) * libm::copysign(1.0, z);
-            let reach = extent * (1.0 + MARGIN) * size + ROUNDING * (size + 2.0);
-            return across < -reach * length(middle);
-        }
-    };
-    let toward = center - point;
-    let distance = length(toward);
-    let sine = radius / distance;
-    if sine >= 1.0 {
-        return false;
-    }
-    let reach = libm::asin(sine) + libm::asin(extent);
-    angle_between(middle, toward) > reach.mul_add(1.0 + MARGIN, ROUNDING * (1.0 + 2.0 / distance))
 }
 
 /// Where a source is as seen from the receiver, and how wide it looks about there, in radians. None if

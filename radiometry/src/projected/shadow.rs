@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::Receiver;
 use super::body::{Occluder, Source, in_one_unit};
 use super::hull::{Hull, are_apart, disk_points};
-use super::scene::Scene;
+use super::scene::{Before, Scene};
 use crate::domain::DomainError;
 use crate::shape::{Disk, Polygon};
 use crate::wide::length;
@@ -52,8 +52,10 @@ pub fn shadow(
         return Ok(Shadow::Unseen);
     }
     let (receiver, source, occluders) = in_one_unit(receiver, source, occluders)?;
-    let Some(scene) = Scene::new(&receiver, &source, &occluders)? else {
-        return Ok(Shadow::Lit);
+    let scene = match Scene::new(&receiver, &source, &occluders)? {
+        Before::Nothing => return Ok(Shadow::Lit),
+        Before::Umbra => return Ok(Shadow::Umbra),
+        Before::Bodies(scene) => scene,
     };
     let visible = scene.visible()?;
     Ok(match (visible.is_shadowed, visible.is_outline_hidden, visible.is_any()) {
@@ -108,6 +110,7 @@ pub fn region_shadow(
     source: &Source,
     occluder: &Occluder,
 ) -> Result<RegionShadow, DomainError> {
+    const STEPS: u32 = 300;
     let anchor = match region {
         Region::Polygon(polygon) => polygon.vertices()[0],
         Region::Disk(disk) => disk.center_m(),
@@ -123,7 +126,7 @@ pub fn region_shadow(
     let region = corners(region);
     let shining = Hull::of_source(&source);
     let is_lit = Hull::of_occluder(occluder, &region, &shining)
-        .is_none_or(|body| are_apart(&region, &shining, &body));
+        .is_none_or(|body| are_apart(&region, &shining, &body, STEPS));
     Ok(if is_lit {
         RegionShadow::Lit
     } else if is_umbra(&region, &shining, occluder) {
