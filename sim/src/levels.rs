@@ -136,3 +136,53 @@ fn has_gap(setting: &Setting<'_>) -> bool {
 
 /// Of a sum of areas.
 const ROUNDING: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest |with - without| / max(either, floor) over signals of the region, ten thousand to
+    /// the decade.
+    fn largest(levels: &Levels, with: impl Fn(f64) -> f64) -> f64 {
+        let signals = (0..=200_000).map(|i| 1e-28 * libm::pow(10.0, f64::from(i) / 10_000.0));
+        let signals = signals.map(|signal_a| signal_a.clamp(levels.lowest_a, levels.highest_a));
+        let influence = |signal_a: f64| {
+            let reading = signal_a.abs().max(with(signal_a).abs()).max(levels.floor_a);
+            (with(signal_a) - signal_a).abs() / reading
+        };
+        signals.map(influence).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_closed_forms_are_the_largest_over_the_signals() {
+        for range in [(0.0, 1e-9), (3e-11, 1e-9), (1e-9, 1e-9), (0.0, 1e-14)] {
+            for floor_a in [1e-13, 1e-10] {
+                let levels = Levels::new(range, floor_a, 2000, (0.05, 3600.0));
+                for current_a in [1e-15, 1e-12, 2e-10, 5e-9, -1e-12, -2e-10, -5e-9] {
+                    let (found, bound) =
+                        (largest(&levels, |signal| signal + current_a), levels.additive(current_a));
+                    assert!(found <= bound * (1.0 + 1e-9), "{found} beside {bound}");
+                    assert!(found >= bound * 0.98, "{found} beside {bound}: {levels:?}");
+                }
+                let (found, bound) =
+                    (largest(&levels, |signal| signal * 0.9), levels.proportional(0.1));
+                assert!((found / bound - 1.0).abs() < 1e-9, "{found} beside {bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_grows_as_a_root_is_largest_at_the_floor() {
+        let levels = Levels::new((0.0, 1e-9), 1e-12, 2000, (0.05, 3600.0));
+        let root = |signal_a: f64| 1e-8 * libm::sqrt(signal_a);
+        let signals = (0..=100_000).map(|i| 1e-9 * f64::from(i) / 100_000.0);
+        let found = signals.map(|signal| root(signal) / signal.max(1e-12)).fold(0.0, f64::max);
+        assert!((levels.of_root(root) / found - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_dwell_has_the_readings_that_the_device_counts() {
+        let readings = |dwell_s, rate_hz| Levels::bright(1e-9, rate_hz, dwell_s).readings();
+        assert_eq!([readings(0.05, 2000), readings(0.0509, 300), readings(1e-9, 10)], [100, 15, 1]);
+    }
+}
