@@ -7,10 +7,12 @@ use glam::DVec3;
 use radiometry::Tolerance;
 use radiometry::convex::{ConvexBody, surface_area};
 use radiometry::form_factor::{
-    coaxial_disks, concentric_spheres, parallel_cylinders, parallel_disks, parallel_rectangles,
-    perpendicular_rectangles, sphere_disk, spheres, wedge_rectangles,
+    aligned_rectangles, coaxial_disks, concentric_spheres, parallel_cylinders, parallel_disks,
+    parallel_rectangles, perpendicular_offset_rectangles, perpendicular_rectangles, polygons,
+    sphere_disk, spheres, throughput_of_polygons, wedge_rectangles,
 };
 use radiometry::ray::Ray;
+use radiometry::shape::Polygon;
 use radiometry::throughput;
 
 const FINE: Tolerance = Tolerance::FINE;
@@ -46,6 +48,75 @@ fn a_form_factor_at_size_zero_is_the_limit() {
     continues("wedge from", |a| wedge_rectangles(a, 5.0, 2.0, 0.6, FINE).unwrap().value / 1e2);
     continues("edge", |l| perpendicular_rectangles(1.0, 1.0, l).unwrap().ratio() / 1e2);
     continues("wedge edge", |l| wedge_rectangles(1.0, 5.0, l, 0.6, FINE).unwrap().value / 1e2);
+}
+
+#[test]
+fn from_a_rectangle_without_a_side_it_is_the_limit() {
+    let (x, y, other) = ([0.2, 1.0], [-0.5, 0.3], [0.1, 0.9]);
+    let aligned = |x, y| aligned_rectangles(x, y, other, [-0.2, 2.0], 0.7).unwrap().ratio();
+    let upright = |x, y| perpendicular_offset_rectangles(x, y, other, [-0.2, 2.0]).unwrap().ratio();
+    let thin = |[low, _]: [f64; 2], width| [low, low + width];
+    continues("aligned x", |width| aligned(thin(x, width), y));
+    continues("aligned y", |width| aligned(x, thin(y, width)));
+    continues("aligned x and y", |width| aligned(thin(x, width), thin(y, width)));
+    continues("upright x", |width| upright(thin(x, width), y));
+    continues("upright y", |width| upright(x, thin(y, width)));
+    continues("upright x and y", |width| upright(thin(x, width), thin(y, width)));
+    // In the plane of a wall that begins higher nothing of it is seen.
+    continues("in the wall's plane", |width| upright([0.0, width], y));
+    // A point under one corner: half of the circle's view in either plane, Howell C-11 and B-3.
+    let corner = aligned_rectangles([0.0; 2], [0.0; 2], [0.0, 1.0], [0.0, 1.0], 1.0).unwrap();
+    let expected = 0.5_f64.sqrt() * 0.5_f64.sqrt().atan() / PI;
+    assert!((corner.ratio() / expected - 1.0).abs() < 1e-13, "{corner:?}, {expected}");
+    // Receivers without a size.
+    continues("to a line", |width| {
+        aligned_rectangles(x, y, other, thin(y, width), 0.7).unwrap().ratio()
+    });
+    continues("to a lintel", |width| {
+        perpendicular_offset_rectangles(x, y, thin(other, width), y).unwrap().ratio()
+    });
+}
+
+#[test]
+#[expect(clippy::float_cmp, reason = "the claim is exactness")]
+fn at_the_foot_of_a_wall_half_is_seen() {
+    let foot =
+        |y, eta| perpendicular_offset_rectangles([0.0; 2], y, [0.0, 2.0], eta).unwrap().ratio();
+    let wall = [1.0, 3.0];
+    for (along, expected) in [
+        ([1.5, 2.0], 0.5),
+        ([0.0, 4.0], 0.25),
+        ([0.0, 2.0], 0.25),
+        ([2.0, 4.0], 0.25),
+        ([3.0, 4.0], 0.0),
+        ([2.0, 2.0], 0.5),
+        ([1.0, 1.0], 0.25),
+        ([3.0, 3.0], 0.25),
+        ([0.5, 0.5], 0.0),
+    ] {
+        assert_eq!(foot(along, wall), expected, "{along:?}");
+        let thin = [along[0], along[1].max(along[0] + 1e-6)];
+        let next = perpendicular_offset_rectangles([0.0, 1e-9], thin, [0.0, 2.0], wall).unwrap();
+        let expected = if along[0] == along[1] && expected == 0.25 {
+            // Beside an end a short line has all or nothing of it.
+            foot(thin, wall)
+        } else {
+            expected
+        };
+        assert!((next.ratio() - expected).abs() < 1e-2, "{along:?}: {next:?}");
+    }
+}
+
+#[test]
+fn a_polygon_without_an_area_receives_nothing() {
+    let triangle = |x: f64| {
+        Polygon::new(vec![DVec3::Z, DVec3::new(1.0, 0.0, 1.0), DVec3::new(2.0, x, 1.0)]).unwrap()
+    };
+    let floor = Polygon::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y]).unwrap();
+    continues("to a line", |x| polygons(&floor, &triangle(x), FINE).unwrap().value);
+    continues("of a line", |x| throughput_of_polygons(&floor, &triangle(x), FINE).unwrap().value);
+    // Which way would it look?
+    assert!(polygons(&triangle(0.0), &floor, FINE).is_err());
 }
 
 #[test]

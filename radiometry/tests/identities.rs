@@ -327,3 +327,24 @@ fn half_a_turn_is_plus_180_degrees() {
         assert!((direction::wrap_deg(angle) - 180.0).abs() < f64::EPSILON);
     }
 }
+
+#[test]
+fn a_polygon_whose_fan_cancels_keeps_its_digits_from_every_vertex() {
+    use radiometry::shape::Polygon;
+    // A dart: from a vertex beside the notch two triangles of 1 sr cancel but for the dart.
+    for notch in [1e-2, 1e-6, 1e-10, 1e-14] {
+        let dart = [(0.0, 1.0), (1.0, -1.0), (0.0, 1.0 - notch), (-1.0, -1.0)];
+        let point = DVec3::new(0.1, -0.2, -1.0);
+        let seen = |first: usize| {
+            let from = (0..4).map(|k| dart[(first + k) % 4]).map(|(x, y)| DVec3::new(x, y, 0.5));
+            solid_angle::polygon(point, &Polygon::new(from.collect()).unwrap()).unwrap().sr()
+        };
+        // From the tip the diagonal lies within: two triangles of one sign.
+        let expected = seen(0);
+        assert!(expected > 0.1 * notch, "{notch:e}: {expected:e}");
+        for first in 1..4 {
+            let found = seen(first);
+            assert!((found / expected - 1.0).abs() < 1e-13, "{notch:e}: {found:e}, {expected:e}");
+        }
+    }
+}

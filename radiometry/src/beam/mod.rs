@@ -21,7 +21,9 @@ pub use footprint::{Footprint, footprint};
 pub use rule::{BeamRay, BeamRule, Moments, disk_rule};
 
 /// Two coaxial disks, and where the beam is looked at.
+/// Who needs it: the detector's model: the rig's, the simulator's and the fit's.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "the unit stands last in the name")]
 pub struct Beam {
     pupil_radius_m: f64,
     stop_radius_m: f64,

@@ -16,6 +16,7 @@ mod events;
 mod legs;
 mod long;
 mod occluded;
+mod overlap;
 mod pairs;
 mod parts;
 mod polygons;

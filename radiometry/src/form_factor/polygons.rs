@@ -6,6 +6,7 @@ use core::f64::consts::PI;
 use glam::DVec3;
 
 use super::{contour, contour_wide, integrated, pairs};
+use crate::direction::normalised;
 use crate::domain::{DomainError, positive};
 use crate::error_free::DoubleDouble;
 use crate::estimate::{Estimate, EstimateError, Tolerance};
@@ -20,7 +21,7 @@ const IN_PLANE: f64 = 4.0 * f64::EPSILON;
 /// Each polygon acts by the face that it turns to the other. Where the plane of one cuts the other,
 /// the one acts by its front alone (from there its vertices run counter-clockwise) and the part of
 /// the other behind it is left out; so `polygons(a, b)` times the area of a is `polygons(b, a)` times
-/// that of b.
+/// that of b. Without an area the one receives nothing; from the other it is an error.
 ///
 /// By Stokes' theorem A₁F₁₂ = (1/2π) ∮∮ ln r dr₁·dr₂ (Sparrow 1963), the inner integral over an edge in
 /// closed form, the outer by adaptive quadrature whose places crowd where the boundaries come near each
@@ -168,7 +169,6 @@ impl Pair {
         let (twice_to, to) = (vector_area(&wide_to), rounded(&wide_to));
         let (normal_from, normal_to) = (twice_from.to_vec(), twice_to.to_vec());
         positive("area_from_m2", normal_from.length())?;
-        positive("area_to_m2", normal_to.length())?;
         let area_from = twice_from.length().to_f64() / 2.0;
         let area_to = twice_to.length().to_f64() / 2.0;
         Ok(Self {
@@ -198,7 +198,9 @@ impl Pair {
 
     /// The parts that can see each other; none if there are none.
     pub(super) fn facing(&self, faces: Faces) -> Option<Facing> {
-        let (normal_from, normal_to) = (self.normal_from.normalize(), self.normal_to.normalize());
+        // What has no area turns no face to anything.
+        let normal_to = normalised(self.normal_to)?;
+        let normal_from = self.normal_from.normalize();
         let (turn_from, turn_to) = match faces {
             Faces::Fronts => {
                 let in_front = |point, normal, others| side(point, normal, others) == Some(1.0);

@@ -1,31 +1,17 @@
 //! Form factors of rectangles: in parallel planes, at right angles, and with a common edge at any angle.
-//!
-//! Where two sides run along one axis, a pair of points counts by its difference v alone, so many times
-//! as the overlap of one side with the other shifted by v; what is left is a one-dimensional integral
-//! over v of a positive function.
+//! They do not know how a function of a difference is integrated: that is next door, in `overlap`.
 
 use core::f64::consts::{FRAC_PI_2, PI};
-use std::sync::OnceLock;
 
+use super::overlap::{Edge, Overlap, kernel};
 use super::{form_factor, integrated, scaled};
 use crate::domain::{DomainError, finite, not_negative, positive, within};
 use crate::estimate::{Estimate, EstimateError, Tolerance};
-use crate::quadrature::{Sum, adaptive_between, adaptive_noisy, gauss_legendre};
+use crate::quadrature::adaptive_noisy;
 use crate::quantity::FormFactor;
-
-/// Sums whose terms are larger than this times the sum give way to a positive integral.
-const CANCELLATION_MAX: f64 = 30.0;
-
-/// Of a stretch: what peaks more narrowly than this takes more panels than an adaptive rule.
-const FINEST: f64 = 1e-7;
 
 /// Of an integrand that is a product of a dozen positive factors and sums.
 const ROUNDINGS: f64 = 12.0 * f64::EPSILON;
-
-/// What the integral that stands in for a closed form is asked for.
-fn kernel() -> Tolerance {
-    Tolerance::FINE.tightened(0.2)
-}
 
 /// Between two equal rectangles a x b, one right above the other at the distance c (Howell C-11). 0
 /// between lines.
@@ -52,7 +38,8 @@ pub fn parallel_rectangles(
 }
 
 /// From [x₁, x₂] x [y₁, y₂] in the plane 0 to [ξ₁, ξ₂] x [η₁, η₂] in the plane z, sides parallel (Howell
-/// C-13): the sum of 16 corner terms, or where they cancel the integral over v = η - y.
+/// C-13): the sum of 16 corner terms, or where they cancel the integral over v = η - y. From a line or
+/// a point that looks along z if a side of 1 has no length; 0 to a line or a point.
 /// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
@@ -78,9 +65,12 @@ pub fn aligned_rectangles(
         [x_m[0], x_m[1], y_m[0], y_m[1], xi_m[0], xi_m[1], eta_m[0], eta_m[1], z_m]
             .map(|length| length / 8.0),
     );
+    if xi1 >= xi2 || eta1 >= eta2 {
+        return Ok(FormFactor::ZERO);
+    }
     let along_x = Overlap::new([x1, x2], [xi1, xi2]);
     let along_y = Overlap::new([y1, y2], [eta1, eta2]);
-    let area = (x2 - x1) * (y2 - y1);
+    let area = or_one(x2 - x1) * or_one(y2 - y1);
     if let Some(corners) = along_x.corner_sum(&along_y, z) {
         return Ok(form_factor(corners / (2.0 * PI * area))?);
     }
@@ -131,7 +121,10 @@ pub fn perpendicular_rectangles(
 
 /// From [x₁, x₂] x [y₁, y₂] in the plane z = 0 to y in [η₁, η₂], z in [z₁, z₂] in the plane x = 0 (Howell
 /// C-15); x₁ and z₁ not negative. The integral over v = η - y of
-/// ln(1 + (x₂²-x₁²)(z₂²-z₁²)/((x₁²+z₁²+v²)(x₂²+z₂²+v²)))/4π, as often as v occurs.
+/// ln(1 + (x₂²-x₁²)(z₂²-z₁²)/((x₁²+z₁²+v²)(x₂²+z₂²+v²)))/4π, as often as v occurs. From a line or a
+/// point that looks along z if a side of 1 has no length: at the foot of the wall the limit from in front
+/// of it, half of what of the line lies along the wall (a point at its end counts half). 0 to a wall
+/// without a width or height.
 /// Who needs it: the page on form factors: walls of a box.
 ///
 /// ```
@@ -156,16 +149,25 @@ pub fn perpendicular_offset_rectangles(
         [x_m[0], x_m[1], y_m[0], y_m[1], z_m[0], z_m[1], eta_m[0], eta_m[1]]
             .map(|length| length / 8.0),
     );
-    let floor = (x2 - x1) * (x2 + x1);
+    let along_y = Overlap::new([y1, y2], [eta1, eta2]);
+    if z1 >= z2 || eta1 >= eta2 {
+        return Ok(FormFactor::ZERO);
+    }
+    if x2 == 0.0 && z1 == 0.0 {
+        return Ok(form_factor(0.5 * along_y.share_at_zero() / or_one(y2 - y1))?);
+    }
+    // Of a line, divided by its width: the logarithm of all but 1 is what exceeds 1.
+    let is_line = x1 >= x2;
+    let floor = if is_line { x1 + x2 } else { (x2 - x1) * (x2 + x1) };
     let wall = (z2 - z1) * (z2 + z1);
     let (near, far) = (x1 * x1 + z1 * z1, x2 * x2 + z2 * z2);
     let rays = |v: f64| {
         let nearest = v.mul_add(v, near).max(f64::MIN_POSITIVE);
-        libm::log1p(floor / nearest * (wall / v.mul_add(v, far)))
+        let excess = floor / nearest * (wall / v.mul_add(v, far));
+        if is_line { excess } else { libm::log1p(excess) }
     };
-    let overlap = Overlap::new([y1, y2], [eta1, eta2]);
     let integral = if x1 > 0.0 || z1 > 0.0 {
-        overlap.graded(rays, libm::hypot(x1, z1), None)
+        along_y.graded(rays, libm::hypot(x1, z1), None)
     } else {
         // With a common edge the integrand is -2 ln v but for what is smooth up to the widths.
         let reach = 0.5 * x2.min(z2);
@@ -174,9 +176,9 @@ pub fn perpendicular_offset_rectangles(
             let (part, slope) = (v / reach, 2.0 * widest / libm::hypot(v, across));
             libm::log(part.mul_add(part, slope * slope))
         };
-        overlap.graded(rays, 0.0, Some(Edge { reach, rest: &rest }))
+        along_y.graded(rays, 0.0, Some(&Edge { reach, rest: &rest }))
     };
-    Ok(form_factor(integral / (4.0 * PI * (x2 - x1) * (y2 - y1)))?)
+    Ok(form_factor(integral / (4.0 * PI * or_one(x2 - x1) * or_one(y2 - y1)))?)
 }
 
 /// From the rectangle a x l to the rectangle b x l that shares its edge l at an angle φ (Howell C-16),
@@ -246,206 +248,14 @@ fn lines_along(longest: f64, edge: f64) -> f64 {
     longest * libm::atan2(edge, longest) + 0.5 * edge * libm::log1p(ratio * ratio)
 }
 
-/// An integrand that is -2 ln(|v|/reach) + rest(v) near 0, its rest smooth up to twice the reach.
-struct Edge<'a> {
-    reach: f64,
-    rest: &'a dyn Fn(f64) -> f64,
-}
-
-impl Edge<'_> {
-    /// From 0 to that fraction of a stretch, which is no more than the reach.
-    fn add(&self, stretch: &Stretch, fraction: f64, sum: &mut Sum) {
-        let length = stretch.reach.abs() * fraction;
-        // ∫ -2 ln t dt = 2, ∫ -2 t ln t dt = 1/2, and the logarithm of the reach in lengths.
-        let step = stretch.weight_step * fraction;
-        let beyond = 2.0 * libm::log(self.reach / length);
-        sum.add(length * (2.0 * stretch.weight_near + 0.5 * step));
-        sum.add(length * beyond * (stretch.weight_near + 0.5 * step));
-        for (node, weight) in panel() {
-            let level = stretch.weight_near + step * node;
-            sum.add(length * weight * level * (self.rest)(length * node));
-        }
-    }
-}
-
-/// Twelve Gauss nodes and weights on [0, 1].
-fn panel() -> &'static [(f64, f64)] {
-    static RULE: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
-    RULE.get_or_init(|| {
-        let onto_unit = |(node, weight)| (f64::midpoint(1.0, node), 0.5 * weight);
-        gauss_legendre(12).into_iter().map(onto_unit).collect()
-    })
-}
-
-/// Finite, and rising.
+/// Finite, and not falling.
 fn interval(argument: &'static str, ends: [f64; 2]) -> Result<(), DomainError> {
-    finite(argument, ends[0])?;
-    finite(argument, ends[1])?;
-    positive(argument, ends[1] - ends[0]).map(|_| ())
+    let from = finite(argument, ends[0])?;
+    within(argument, ends[1], from, f64::INFINITY)?;
+    finite(argument, ends[1]).map(|_| ())
 }
 
-/// How often a difference v = b - a occurs between a in one interval and b in another: rising from the
-/// first of four breaks to the second, level to the third, falling to the fourth.
-struct Overlap {
-    breaks: [f64; 4],
-    level: f64,
-}
-
-/// A stretch of v: from its end nearest to 0 to the other one, and the weight at both.
-struct Stretch {
-    near: f64,
-    reach: f64,
-    weight_near: f64,
-    weight_step: f64,
-}
-
-impl Overlap {
-    fn new(a: [f64; 2], b: [f64; 2]) -> Self {
-        let (first, second) = (b[0] - a[0], b[1] - a[1]);
-        let level = (a[1] - a[0]).min(b[1] - b[0]);
-        Self { breaks: [b[0] - a[1], first.min(second), first.max(second), b[1] - a[0]], level }
-    }
-
-    fn stretches(&self) -> Vec<Stretch> {
-        let [start, level_start, level_end, end] = self.breaks;
-        let mut stretches = Vec::with_capacity(6);
-        let mut push = |near: f64, reach: f64, weight_near: f64, weight_step: f64| {
-            if reach != 0.0 {
-                stretches.push(Stretch { near, reach, weight_near, weight_step });
-            }
-        };
-        for (from, reach, weight, step) in [
-            (start, self.level, 0.0, self.level),
-            (level_start, level_end - level_start, self.level, 0.0),
-            (end - self.level, self.level, self.level, -self.level),
-        ] {
-            let to = from + reach;
-            if from < 0.0 && to > 0.0 {
-                let at_zero = weight + step * (-from / reach);
-                push(0.0, from, at_zero, weight - at_zero);
-                push(0.0, to, at_zero, weight + step - at_zero);
-            } else if from >= 0.0 {
-                push(from, reach, weight, step);
-            } else {
-                push(if to > -0.0 { 0.0 } else { to }, -reach, weight + step, -step);
-            }
-        }
-        stretches
-    }
-
-    /// ∫ weight(v) f(v) dv. f may have its peak, or a logarithm, at 0: the places crowd there with
-    /// the fourth power.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a place is not negative and at most the count of stretches"
-    )]
-    fn integrate(
-        &self,
-        mut integrand: impl FnMut(f64) -> f64,
-        tolerance: Tolerance,
-    ) -> Result<Estimate, EstimateError> {
-        let stretches = self.stretches();
-        let points: Vec<f64> = (0..=stretches.len()).map(|place| place as f64).collect();
-        let at = |place: f64| {
-            let index = (place as usize).min(stretches.len() - 1);
-            let stretch = &stretches[index];
-            let fraction = place - index as f64;
-            let cube = fraction * fraction * fraction;
-            let fourth = cube * fraction;
-            let weight = stretch.weight_near + stretch.weight_step * fourth;
-            let value = integrand(stretch.near + stretch.reach * fourth);
-            4.0 * cube * stretch.reach.abs() * weight * value
-        };
-        adaptive_between(at, &points, tolerance)
-    }
-
-    /// Whether the panels find a peak of that width around 0.
-    fn resolves(&self, width: f64) -> bool {
-        let is_wide = |s: &Stretch| libm::hypot(s.near, width) >= FINEST * s.reach.abs();
-        self.stretches().iter().all(is_wide)
-    }
-
-    /// ∫ weight(v) f(v) dv to rounding, for a positive f that is smooth but for poles or branches at
-    /// ±i `scale` and beyond: Gauss panels no longer than 0.8 of the distance from there to where
-    /// they begin, which twelve nodes integrate to 1e-17 (Bernstein's ellipse has semi-axes that
-    /// add up to 5.5 half panels, and 5.5^-24 is left).
-    fn graded(
-        &self,
-        mut integrand: impl FnMut(f64) -> f64,
-        scale: f64,
-        edge: Option<Edge<'_>>,
-    ) -> f64 {
-        const PANEL: f64 = 0.8;
-        let mut sum = Sum::default();
-        for stretch in self.stretches() {
-            let length = stretch.reach.abs();
-            let mut done = 0.0;
-            if let Some(edge) = edge.as_ref().filter(|_| stretch.near == 0.0) {
-                done = edge.reach.min(length);
-                edge.add(&stretch, done / length, &mut sum);
-            }
-            while done < length {
-                let rest = length - done;
-                let from = stretch.near.abs() + done;
-                let step = (PANEL * libm::hypot(from, scale))
-                    .max(1e-70 * length)
-                    .max(f64::MIN_POSITIVE)
-                    .min(rest);
-                for (node, weight) in panel() {
-                    let part = (done + step * node) / length;
-                    let level = stretch.weight_near + stretch.weight_step * part;
-                    sum.add(step * weight * level * integrand(stretch.near + stretch.reach * part));
-                }
-                // The last panel ends where the stretch does, whatever the roundings.
-                done = if step < rest { done + step } else { length };
-            }
-        }
-        sum.value()
-    }
-
-    /// The corner terms of C-13, unless they cancel.
-    fn corner_sum(&self, other: &Self, z: f64) -> Option<f64> {
-        let (mut sum, mut size) = (Sum::default(), 0.0);
-        for (i, u) in self.breaks.into_iter().enumerate() {
-            for (j, v) in other.breaks.into_iter().enumerate() {
-                // + at the outer breaks, - at the inner ones.
-                let sign = if (i == 0 || i == 3) == (j == 0 || j == 3) { 1.0 } else { -1.0 };
-                let (slant_u, slant_v) = (libm::hypot(u, z), libm::hypot(v, z));
-                let ratio = (u / z) * (u / z) + (v / z) * (v / z);
-                for term in [
-                    u * slant_v * libm::atan2(u, slant_v),
-                    v * slant_u * libm::atan2(v, slant_u),
-                    -0.5 * z * z * libm::log1p(ratio),
-                ] {
-                    sum.add(sign * term);
-                    size += term.abs();
-                }
-            }
-        }
-        let value = sum.value();
-        (size < CANCELLATION_MAX * value).then_some(value)
-    }
-
-    /// ∬ z²/((ξ-x)² + v² + z²)² dξ dx.
-    fn between_strips(
-        &self,
-        v: f64,
-        z: f64,
-        integrate: impl Fn(&dyn Fn(f64) -> f64, f64) -> Result<f64, EstimateError>,
-    ) -> Result<f64, EstimateError> {
-        let rho = libm::hypot(v, z);
-        let factor = z / rho * (z / rho) / (2.0 * rho);
-        let terms = self.breaks.map(|u| u * libm::atan2(u, rho));
-        let sum = [terms[0], -terms[1], -terms[2], terms[3]].into_iter().collect::<Sum>().value();
-        let size: f64 = terms.iter().sum();
-        if size < CANCELLATION_MAX * sum {
-            return Ok(factor * sum);
-        }
-        let kernel_at = |u: f64| {
-            let ratio = z / u.mul_add(u, rho * rho);
-            ratio * ratio
-        };
-        integrate(&kernel_at, rho)
-    }
+/// A length to divide by; what has none is not divided by it.
+fn or_one(length: f64) -> f64 {
+    if length == 0.0 { 1.0 } else { length }
 }

@@ -10,7 +10,11 @@ use crate::error_free::DoubleDouble;
 use crate::quadrature::Sum;
 use crate::quantity::SolidAngle;
 use crate::shape::Polygon;
+use crate::transcendental;
 use crate::wide::{WideVec, in_units, unit_exponent};
+
+/// A fan whose triangles are larger than this times their sum is summed in double-double.
+const CANCELLATION_MAX: f64 = 30.0;
 
 /// Signed solid angle of the triangle (a, b, c) seen from `point`: tan(Ω/2) = det/D with
 /// det = a·(b×c) and D = abc + (a·b)c + (b·c)a + (c·a)b of the vectors from the point (Van Oosterom
@@ -33,7 +37,7 @@ pub fn triangle_signed(
     b: DVec3,
     c: DVec3,
 ) -> Result<SolidAngle, DomainError> {
-    let (numerator, denominator) = half_tangent(point, [a, b, c])?;
+    let (numerator, denominator) = narrow(half_tangent(point, [a, b, c])?);
     if numerator == 0.0 {
         // In the plane: nothing is seen from outside, and from inside it depends on the side.
         return if denominator > 0.0 {
@@ -57,15 +61,15 @@ pub fn triangle_signed(
 /// # Ok::<(), radiometry::DomainError>(())
 /// ```
 pub fn triangle(a: DVec3, b: DVec3, c: DVec3) -> Result<SolidAngle, DomainError> {
-    let (numerator, denominator) = half_tangent(DVec3::ZERO, [a, b, c])?;
+    let (numerator, denominator) = narrow(half_tangent(DVec3::ZERO, [a, b, c])?);
     if numerator == 0.0 && denominator == 0.0 {
         return Err(DomainError::Touching { shape: "triangle's edge" });
     }
     Ok(SolidAngle::from_sr(2.0 * libm::atan2(numerator.abs(), denominator)))
 }
 
-/// Solid angle of a polygon, convex or not, seen from `point`: the signed triangles of a fan. Zero
-/// from its plane outside it; up to 2π near its face.
+/// Solid angle of a polygon, convex or not, seen from `point`: the signed triangles of a fan, in
+/// double-double where they cancel. Zero from its plane outside it; up to 2π near its face.
 /// Who needs it: the page on solid angle: faces of a room.
 ///
 /// ```
@@ -86,15 +90,42 @@ pub fn polygon(point: DVec3, polygon: &Polygon) -> Result<SolidAngle, DomainErro
     let Some((&first, rest)) = vertices.split_first() else {
         return Ok(SolidAngle::ZERO);
     };
-    let mut sum = Sum::default();
-    for pair in rest.windows(2) {
-        sum.add(triangle_signed(point, first, pair[0], pair[1])?.sr());
+    let fan = || rest.windows(2).map(|pair| [first, pair[0], pair[1]]);
+    let (mut sum, mut size) = (Sum::default(), 0.0);
+    for [a, b, c] in fan() {
+        let part = triangle_signed(point, a, b, c)?.sr();
+        sum.add(part);
+        size += part.abs();
     }
-    Ok(SolidAngle::from_sr(sum.value().abs().min(2.0 * PI)))
+    let mut value = sum.value().abs();
+    if size > CANCELLATION_MAX * value {
+        let mut wide = DoubleDouble::from_f64(0.0);
+        for triangle in fan() {
+            wide = wide.add(half_angle(half_tangent(point, triangle)?));
+        }
+        value = 2.0 * wide.to_f64().abs();
+    }
+    Ok(SolidAngle::from_sr(value.min(2.0 * PI)))
+}
+
+/// The angle of such a tangent, with all its digits.
+fn half_angle((numerator, denominator): (DoubleDouble, DoubleDouble)) -> DoubleDouble {
+    if numerator.to_f64() < 0.0 {
+        transcendental::angle(numerator.neg(), denominator).neg()
+    } else {
+        transcendental::angle(numerator, denominator)
+    }
+}
+
+fn narrow((numerator, denominator): (DoubleDouble, DoubleDouble)) -> (f64, f64) {
+    (numerator.to_f64(), denominator.to_f64())
 }
 
 /// The two arguments of the arc tangent that is half the solid angle.
-fn half_tangent(point: DVec3, corners: [DVec3; 3]) -> Result<(f64, f64), DomainError> {
+fn half_tangent(
+    point: DVec3,
+    corners: [DVec3; 3],
+) -> Result<(DoubleDouble, DoubleDouble), DomainError> {
     finite_vector("point", point)?;
     for (name, corner) in ["a", "b", "c"].into_iter().zip(corners) {
         finite_vector(name, corner)?;
@@ -108,7 +139,7 @@ fn half_tangent(point: DVec3, corners: [DVec3; 3]) -> Result<(f64, f64), DomainE
     };
     let det = a.dot(b.sub(a).cross(c.sub(a)));
     // Each vector by its own power of two: near and far vertices do not drown each other.
-    let det = det.scaled(-(a_size + b_size + c_size)).to_f64();
+    let det = det.scaled(-(a_size + b_size + c_size));
     let (a, b, c) = (a.scaled(-a_size), b.scaled(-b_size), c.scaled(-c_size));
     let (a_length, b_length, c_length) = (a.length(), b.length(), c.length());
     let denominator: DoubleDouble = a_length
@@ -117,5 +148,5 @@ fn half_tangent(point: DVec3, corners: [DVec3; 3]) -> Result<(f64, f64), DomainE
         .add(a.dot(b).mul(c_length))
         .add(b.dot(c).mul(a_length))
         .add(c.dot(a).mul(b_length));
-    Ok((det, denominator.to_f64()))
+    Ok((det, denominator))
 }

@@ -271,7 +271,7 @@ pub(super) fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
             body.expect_only(ROUND)?;
             Ok(Source::Sphere(sphere(body)?))
         }
-        other => Err(Refusal::new(format!("the source kind `{other}` is not known"))),
+        other => Err(unknown_kind("source", other, "disk, sphere or polygon")),
     }
 }
 
@@ -291,6 +291,10 @@ pub(super) fn occluder(body: Inputs<'_>) -> Result<Occluder, Refusal> {
             let half_plane = HalfPlane::new(body.number("x_max")?, body.number("z")?)?;
             Ok(Occluder::HalfPlane(half_plane))
         }
-        other => Err(Refusal::new(format!("the occluder kind `{other}` is not known"))),
+        other => Err(unknown_kind("occluder", other, "half-plane, disk, sphere or polygon")),
     }
+}
+
+fn unknown_kind(what: &str, found: &str, expected: &str) -> Refusal {
+    Refusal::new(format!("the {what} kind `{found}` is not known, expected {expected}"))
 }
