@@ -8,6 +8,7 @@ use crate::domain::{DomainError, within};
 
 /// A rectangle that holds every point where a ray of the beam meets a tilted plane through the
 /// beam's origin, metres from there; all are at least 0.
+/// Who needs it: the simulator, to know whether a spot runs over an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
     /// In the plane of incidence, on the detector's side.
@@ -25,6 +26,7 @@ pub struct Footprint {
 /// can't be further from the axis than the beam reaches there. With k = (R + r)/h that is, for a
 /// spot at the origin, u = r/(cos θ - k sin θ) on the far side: more than the ellipse's r/cos θ,
 /// which is its limit for a small pupil and spot.
+/// Who needs it: the simulator, to know whether a spot runs over an edge.
 ///
 /// ```
 /// use radiometry::beam::{Beam, footprint};

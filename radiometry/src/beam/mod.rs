@@ -127,6 +127,7 @@ impl Beam {
 }
 
 /// Where a beam looks: its frame in a scene's.
+/// Who needs it: the simulator and the fit, to average a field over a reading's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     origin: DVec3,

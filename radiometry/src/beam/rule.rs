@@ -11,6 +11,7 @@ use crate::domain::DomainError;
 use crate::quadrature::{Sum, gauss_legendre};
 
 /// A ray of a beam, in the beam's frame.
+/// Who needs it: the simulator and the fit: see [`BeamRule`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamRay {
     /// Where it passes the stop (the spot), metres; any point of the ray would do.
@@ -22,6 +23,7 @@ pub struct BeamRay {
 }
 
 /// Rays that stand for a beam.
+/// Who needs it: the simulator and the fit, to average a field over a reading's beam.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeamRule {
     rays: Vec<BeamRay>,
@@ -29,6 +31,7 @@ pub struct BeamRule {
 }
 
 /// Second moments of a beam, the same in any plane through its axis, throughput-weighted.
+/// Who needs it: the fit, to tell whether a point may stand for a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moments {
     /// Of a ray's place across the axis at the origin, one component, m².
@@ -41,6 +44,7 @@ pub struct Moments {
 
 /// Nodes and weights on the unit disk, exact for polynomials in x and y up to `degree`; the weights
 /// sum to one. Degree 0 and 1: the centre alone.
+/// Who needs it: [`BeamRule`] on pupil and spot.
 ///
 /// ```
 /// use radiometry::beam::disk_rule;

@@ -34,6 +34,7 @@ const NEAR_POLE: usize = 8;
 
 /// Radiance by side x side pixels of 4π/side² each, row after row: u grows with the column, towards +x,
 /// v with the row, towards +y; the pole +z is in the middle, -z in the corners. A pixel is uniform.
+/// Who needs it: the simulator, for lit samples; the page on environment maps.
 ///
 /// ```
 /// use glam::DVec3;
@@ -73,6 +74,7 @@ impl<W: Weighting> EqualArea<W> {
     }
 
     /// Of every pixel, 4π/side².
+    /// Who needs it: whoever adds a map up pixel by pixel.
     pub fn pixel_solid_angle(&self) -> SolidAngle {
         SolidAngle::from_sr(self.solid_angle_sr())
     }
@@ -82,6 +84,7 @@ impl<W: Weighting> EqualArea<W> {
     }
 
     /// What comes from a direction (of any length but 0): its pixel's radiance.
+    /// Who needs it: the simulator, for what a sample reflects.
     pub fn radiance(&self, towards: DVec3) -> Result<Radiance<W>, DomainError> {
         let towards = unit("direction", towards)?;
         let across = towards.x * towards.x + towards.y * towards.y;
@@ -107,6 +110,7 @@ impl<W: Weighting> EqualArea<W> {
     /// length but 0. Pixels above the horizon are known to rounding, and what the horizon leaves of the
     /// others to some ulp of the whole; where that is not enough it is integrated, and the tolerance
     /// is for the whole.
+    /// Who needs it: the simulator, for lit samples; the page on environment maps.
     pub fn irradiance(
         &self,
         normal: DVec3,

@@ -26,6 +26,7 @@ const NEAR: f64 = 1e-9;
 
 /// Radiance by pixels of π/rows by 2π/columns: row 0 begins at θ = 0, the pole +z, the last one ends at
 /// θ = π; column 0 begins at φ = 0, over +x, and φ grows with the column. A pixel is uniform.
+/// Who needs it: the simulator, for lit samples; the page on environment maps.
 ///
 /// ```
 /// use glam::DVec3;
@@ -138,6 +139,7 @@ impl<W: Weighting> LatLong<W> {
     }
 
     /// What comes from a direction (of any length but 0): its pixel's radiance.
+    /// Who needs it: the simulator, for what a sample reflects.
     ///
     /// ```
     /// use glam::DVec3;
@@ -160,6 +162,7 @@ impl<W: Weighting> LatLong<W> {
     }
 
     /// The solid angle of each pixel of a row, exactly: Δφ (cos θ₁ - cos θ₂). None beyond the last row.
+    /// Who needs it: whoever adds a map up pixel by pixel.
     pub fn pixel_solid_angle(&self, row: usize) -> Option<SolidAngle> {
         let ring = self.rings.get(row)?;
         Some(SolidAngle::from_sr(ring.solid * (TAU / self.columns as f64)))
@@ -171,6 +174,7 @@ impl<W: Weighting> LatLong<W> {
     ///
     /// It takes a few operations for each column and pixel on the horizon, and sums of sixteen rows for
     /// the others. An error beside that of the normal where the answer is beyond the largest double.
+    /// Who needs it: the simulator, for lit samples; the page on environment maps.
     pub fn irradiance(&self, normal: DVec3) -> Result<Estimate, DomainError> {
         let horizon = Horizon::of(normal)?;
         let split = PARTS_MIN.div_ceil(self.columns);

@@ -8,6 +8,7 @@ use crate::shape::{Disk, HalfPlane, Polygon, Sphere};
 use crate::wide::{in_units, unit_exponent};
 
 /// What shines, uniformly.
+/// Who needs it: the simulator, for lamps.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
     /// Both faces.
@@ -19,6 +20,7 @@ pub enum Source {
 }
 
 /// What stands in the way.
+/// Who needs it: the simulator, for baffles and shutters.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Occluder {
     /// A knife edge.

@@ -42,6 +42,7 @@ pub fn occluded(
 /// The same behind any number of bodies, whose shadows may overlap in any way: what any of them
 /// hides is hidden once. Each may be in front of the source or behind it, and they may penetrate
 /// each other, but not the source.
+/// Who needs it: the simulator: baffles and shutters together.
 ///
 /// ```
 /// use glam::DVec3;

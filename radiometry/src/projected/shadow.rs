@@ -14,6 +14,7 @@ use crate::shape::{Disk, Polygon};
 use crate::wide::length;
 
 /// What a point sees of a source with bodies before it.
+/// Who needs it: the page on penumbra; the person at the rig, to place a baffle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shadow {
     /// All that its horizon leaves.
@@ -31,6 +32,7 @@ pub enum Shadow {
 
 /// Which shadow a receiver is in. Shadows and gaps narrower than 1e-12 of the source are not seen.
 /// Sim: which points need [`super::occluded_by`] at all.
+/// Who needs it: the page on penumbra; the person at the rig, to place a baffle.
 ///
 /// ```
 /// use glam::DVec3;
@@ -67,6 +69,7 @@ pub fn shadow(
 }
 
 /// A bounded part of a plane.
+/// Who needs it: the simulator, where it compiles a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Region {
     /// A rectangle, or any other simple polygon.
@@ -76,6 +79,7 @@ pub enum Region {
 }
 
 /// What is known of all points of a region at once.
+/// Who needs it: the simulator, where it compiles a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionShadow {
     /// No point is shaded: nothing of the source is hidden from any.

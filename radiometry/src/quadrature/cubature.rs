@@ -24,6 +24,7 @@ const EVALUATIONS: usize = NODES[0] * NODES[0] + NODES[1] * NODES[1];
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A part of the plane to integrate over; its orientation does not matter.
+/// Who needs it: whoever calls [`cubature`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell {
     /// By its vertices.

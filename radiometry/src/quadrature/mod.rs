@@ -94,6 +94,7 @@ fn legendre_pair(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
 }
 
 /// A direction of a rule, with its weight in projected solid angle.
+/// Who needs it: whoever averages over a [`cone`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConeNode {
     /// From +z, radians.

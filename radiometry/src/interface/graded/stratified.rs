@@ -28,6 +28,7 @@ pub struct Stratified<P> {
 }
 
 /// A ray at a level of such a medium, on its way either up or down.
+/// Who needs it: the page on radiance along curved rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StratifiedRay<'a, P> {
     medium: &'a Stratified<P>,
@@ -40,6 +41,7 @@ pub struct StratifiedRay<'a, P> {
 }
 
 /// A ray's way to a level, or to where it turns before.
+/// Who needs it: the page on radiance along curved rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     /// Where it ends, m: at the level asked for, or where the ray turns.

@@ -29,6 +29,7 @@ impl<F: Fn(DVec3) -> (f64, DVec3)> IndexField for F {
 }
 
 /// Where a ray is followed to.
+/// Who needs it: whoever calls [`trace`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stop {
     /// Where it first crosses the plane after it started, from either side.
@@ -45,6 +46,7 @@ pub enum Stop {
 }
 
 /// Where a ray got to.
+/// Who needs it: whoever calls [`trace`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Traced {
     /// Its place, m.
