@@ -6,12 +6,13 @@ use core::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec2, DVec3};
 use radiometry::beam::{Beam, Placed, disk_rule, footprint};
 
-/// Slender, wide, and a tube; the widest last.
-fn beams() -> [Beam; 4] {
+/// Slender, wide, a tube, one whose stop stands behind the plane, and the widest.
+fn beams() -> [Beam; 5] {
     [
         Beam::of_spot(0.006_25, 0.002_5, 0.3).unwrap(),
         Beam::of_spot(0.012_5, 0.005, 0.3).unwrap(),
         Beam::of_tube(0.004, 0.003, 0.08, 0.05).unwrap(),
+        Beam::of_spot(0.006_25, 0.002_5, 0.3).unwrap().with_origin_moved(0.004),
         Beam::of_spot(0.06, 0.05, 0.2).unwrap(),
     ]
 }

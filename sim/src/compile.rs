@@ -8,15 +8,16 @@
 use core::fmt;
 use std::sync::Arc;
 
+use radiometry::DomainError;
 use radiometry::throughput::coaxial_disks;
 
 use crate::chance::draw;
 use crate::check::check;
 use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
-use crate::field::Field;
+use crate::field::{Field, Ray};
 use crate::mechanics::{self, AxisTruth, Kinematics, Moment};
-use crate::optics::{self, Optics};
+use crate::optics::{Axis, Light, Optics};
 use crate::stage::Stages;
 use crate::time;
 use crate::{Nominal, NominalDetector, Quantity, Region, Scene, Simulated, Terms, Truth};
@@ -32,6 +33,7 @@ pub struct Compiled {
     pub(crate) kinematics: Arc<dyn Kinematics>,
     /// When a reading looks while the axes move.
     pub(crate) moments: Vec<Moment>,
+    field: Arc<dyn Field>,
     pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
     pub(crate) current_per_radiance: f64,
@@ -46,6 +48,8 @@ pub struct Compiled {
 /// Why a scene and a rig don't make a simulated rig.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CompileError {
+    /// Pupil, spot and distance make no beam.
+    Beam(DomainError),
     /// The axes' channels are not 0 to 3, each once.
     Channels([u8; 4]),
     /// Keys that contradict each other: the one, and what it asks of the other.
@@ -104,6 +108,8 @@ pub(crate) struct Setting<'s> {
     pub(crate) brightest: f64,
     /// The noise floor: the standard deviation of a dwell's mean in the dark, as a radiance.
     pub(crate) floor: f64,
+    /// How much all that is left out may amount to, relative.
+    pub(crate) tolerance: f64,
 }
 
 /// Compiles a rig. The same arguments give the same rig, to the last bit.
@@ -123,14 +129,16 @@ pub fn compile(
     }
     let scene = Arc::new(scene);
     let setting = Setting::new(&scene, &nominal, &simulated, terms)?;
-    let tolerance = terms.tolerance.unwrap_or_else(|| setting.relative_noise() * PART_OF_NOISE);
-    let mut candidates = optics::candidates(&setting);
+    let tolerance = setting.tolerance;
+    let mut light = Light::of(&setting).map_err(CompileError::Beam)?;
+    let mut candidates = core::mem::take(&mut light.candidates);
     candidates.extend(mechanics::candidates(&setting));
     candidates.extend(time::candidates(&setting));
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
     let departing = detector::departing(&nominal.detector, &chosen);
-    let (region, optics) = (setting.region, optics::chosen(&setting, &chosen));
+    let (region, optics) = (setting.region, light.optics(&setting, &chosen));
+    let field = Arc::clone(&setting.field);
     let (responsivity, throughput) = draw_optics(&departing, terms.seed)?;
     Ok(Compiled {
         current_per_radiance: responsivity * throughput,
@@ -143,6 +151,7 @@ pub fn compile(
         nominal,
         simulated,
         seed: terms.seed,
+        field,
         optics,
         chosen,
         region,
@@ -176,8 +185,11 @@ impl<'s> Setting<'s> {
             brightest: field.brightest(&region),
             field,
             floor: 0.0,
+            tolerance: 0.0,
         };
         setting.floor = setting.noise_a(0.0) / setting.current_per_radiance;
+        let default = setting.relative_noise() * PART_OF_NOISE;
+        setting.tolerance = terms.tolerance.unwrap_or(default);
         Ok(setting)
     }
 
@@ -232,6 +244,17 @@ impl Compiled {
     /// How much all that was left out may change a reading, relative to it.
     pub const fn tolerance(&self) -> f64 {
         self.tolerance
+    }
+
+    /// Radiance along a ray, as it leaves the sample.
+    pub fn radiance(&self, ray: &Ray) -> f64 {
+        self.field.radiance(ray)
+    }
+
+    /// What the detector sees from there: the mean radiance of its beam, or the radiance along its
+    /// axis if the beam was left out.
+    pub fn seen_radiance(&self, axis: &Axis) -> f64 {
+        self.optics.radiance(axis)
     }
 
     /// What leaves the sample, over a region.
@@ -295,6 +318,7 @@ fn draw_amplifier(detector: &NominalDetector, seed: u64) -> Result<Amplifier, Co
 impl fmt::Display for CompileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Beam(error) => write!(f, "detector: {error}"),
             Self::Channels(found) => {
                 write!(f, "the axes are on channels {found:?}, expected 0 to 3, each once")
             }

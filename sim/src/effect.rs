@@ -21,6 +21,9 @@ pub struct EffectRow {
     /// How large its influence is at most; for something random or drawn, its standard
     /// deviation.
     pub bound: Option<Bound>,
+    /// How far, relative to a reading, the way in which it is computed may be off; `None` where it
+    /// is exact to rounding.
+    pub error: Option<f64>,
     /// What it costs a reading, nanoseconds, once somebody has measured it.
     pub cost_ns: Option<f64>,
     /// How it is computed, or why it is left out.
@@ -75,6 +78,8 @@ pub(crate) struct Candidate {
     /// What calls for it. `None`: nothing.
     pub(crate) cause: Option<String>,
     pub(crate) influence: Influence,
+    /// Of the way in which it is computed: see [`EffectRow::error`].
+    pub(crate) error: Option<f64>,
     /// How it is computed where it is in.
     pub(crate) how_in: String,
     /// What a reading is taken for where it is out; why nothing calls for it.
@@ -107,6 +112,7 @@ impl Candidate {
             name: name.into(),
             cause: calls.then(|| key.to_owned()),
             influence,
+            error: None,
             how_in: how_in.to_owned(),
             how_out: format!("not called for: {key}"),
         }
@@ -209,7 +215,7 @@ pub(crate) fn decide(
 
 fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
     let bound = candidate.bound();
-    let Candidate { name, cause, how_in, how_out, .. } = candidate;
+    let Candidate { name, cause, error, how_in, how_out, .. } = candidate;
     let how = match why {
         Why::CalledFor => how_in,
         Why::Forced => format!("{how_in} (forced)"),
@@ -222,7 +228,8 @@ fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
         Why::Without => format!("left out by request; {how_out}"),
     };
     let included = matches!(why, Why::CalledFor | Why::Forced);
-    EffectRow { name, included, cause, bound, cost_ns: None, how }
+    let error = error.filter(|_| included);
+    EffectRow { name, included, cause, bound, error, cost_ns: None, how }
 }
 
 /// Names that are none, and wishes that can't be granted.

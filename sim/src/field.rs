@@ -3,10 +3,13 @@
 
 use core::f64::consts::TAU;
 use core::fmt;
+use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use crate::{Emitter, Region, Scene};
+use crate::optics::Boundary;
+use crate::scene::Shape;
+use crate::{Emitter, Law, Region, Scene};
 
 /// A ray from the sample to the detector, sample's frame. It is named by where it crosses the
 /// sample's plane and by its direction: light that leaves something above the plane goes along the
@@ -56,9 +59,40 @@ pub(crate) trait Field: fmt::Debug + Send + Sync {
         grid(region)
     }
 
+    /// The flat patches on the sample's plane, if they are all that there is to see; they do not
+    /// overlap.
+    fn patches(&self) -> Option<Vec<Patch>> {
+        None
+    }
+
     /// The largest radiance of a region; no less than that of any landmark.
     fn brightest(&self, region: &Region) -> f64 {
         self.landmarks(region).iter().map(|ray| self.radiance(ray)).fold(0.0, f64::max)
+    }
+}
+
+/// A flat patch on the sample's plane.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Patch {
+    /// What calls it into being: its key in scene.toml.
+    pub(crate) name: String,
+    pub(crate) boundary: Boundary,
+    /// A place within. Its radiance goes with direction alone.
+    pub(crate) place: DVec2,
+    /// Its radiance, where that is one in all places and directions.
+    pub(crate) uniform: Option<f64>,
+}
+
+/// What leaves one place of a field, as if it left every place.
+#[derive(Debug)]
+pub(crate) struct OfPlace {
+    pub(crate) field: Arc<dyn Field>,
+    pub(crate) place: DVec3,
+}
+
+impl Field for OfPlace {
+    fn radiance(&self, ray: &Ray) -> f64 {
+        self.field.radiance(&Ray { point: self.place, ..*ray })
     }
 }
 
@@ -91,6 +125,28 @@ impl Field for Scene {
         let on = |emitter: &&Emitter| emitter.shape().is_some_and(|shape| shape.contains(x_m, y_m));
         let emitter = self.emitters().iter().find(on);
         emitter.map_or(0.0, |emitter| emitter.radiance_into(x_m, y_m, ray.direction))
+    }
+
+    fn patches(&self) -> Option<Vec<Patch>> {
+        let patch = |(i, emitter): (usize, &Emitter)| {
+            let shape = emitter.shape().filter(|_| emitter.texture().is_none())?;
+            let ((x0, x1), (y0, y1)) = shape.bounding_box();
+            let (x, y) = (f64::midpoint(x0, x1), f64::midpoint(y0, y1));
+            let boundary = match shape {
+                Shape::Disk { x_m, y_m, radius_m } => {
+                    Boundary::Circle { centre: DVec2::new(*x_m, *y_m), radius: *radius_m }
+                }
+                Shape::Polygon(outline) => {
+                    Boundary::Polygon(outline.corners_m().iter().map(|c| DVec2::from(*c)).collect())
+                }
+                Shape::Rectangle { x_m, y_m } => Boundary::of_rectangle(*x_m, *y_m),
+            };
+            let is_even = matches!(emitter.law(), Law::Lambertian);
+            let uniform = is_even.then(|| emitter.radiance_into(x, y, DVec3::Z));
+            let place = boundary.place_within();
+            Some(Patch { name: format!("emitter[{i}]"), place, boundary, uniform })
+        };
+        self.emitters().iter().enumerate().map(patch).collect()
     }
 
     fn brightest(&self, region: &Region) -> f64 {

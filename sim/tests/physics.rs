@@ -9,8 +9,8 @@ use std::sync::Arc;
 use bench::{compiled, counts, exact_rig};
 use firmware_protocol::{Board, Illumination, Instant, Shutter};
 use sim::{
-    Compiled, Emitter, Nominal, Quantity, Region, Scene, Shape, Simulated, SimulatedBoard,
-    Tabulated, Terms, compile,
+    Compiled, EffectRow, Emitter, Nominal, Quantity, Region, Scene, Shape, Simulated,
+    SimulatedBoard, Tabulated, Terms, compile,
 };
 
 const FULL_SCALE: f64 = 8_388_608.0;
@@ -70,9 +70,14 @@ fn a_lambertian_patch_has_one_radiance_from_anywhere() {
         let mut rig = exact_rig();
         rig.detector.distance_m = distance_m;
         rig.detector.spot_radius_m = spot_radius_m;
-        let compiled = compiled(lambertian(30.0), rig, 1);
+        // As far as 85° the beam of the nearest rig goes over 0.5 m of the sample.
+        let patch = Emitter::lambertian(Shape::rectangle(0.0, 0.0, 2.0, 2.0), 30.0);
+        let scene = Scene::new(Quantity::Radiance).with(patch).unwrap();
+        let compiled = compile(scene, rig, Simulated::default(), &Terms::default()).unwrap();
+        assert!(row(&compiled, "finite-beam").included);
+        let compiled = Arc::new(compiled);
         let mut board = homed(&compiled);
-        for theta in [-85.0, -30.0, 0.0, 45.0, 89.0] {
+        for theta in [-85.0, -30.0, 0.0, 45.0, 80.0] {
             for (phi, x_m, y_m) in [(0.0, 0.0, 0.0), (170.0, 0.03, -0.04), (-60.0, -0.04, 0.02)] {
                 go_to(&mut board, theta, phi, x_m, y_m);
                 let found = radiance(&compiled, &mut board);
@@ -319,16 +324,17 @@ fn truth_of_a_table_is_its_flux_over_its_area() {
     assert!((asymmetric().flux_within(PI / 2.0) / (area * truth.exitance()) - 1.0).abs() < 1e-14);
 }
 
+fn row(rig: &Compiled, name: &str) -> EffectRow {
+    rig.effects().iter().find(|row| row.name == name).cloned().expect("a row for each effect")
+}
+
 #[test]
 fn a_rig_holds_what_is_called_for_and_says_why() {
     let bare = compiled(lambertian(1.0), exact_rig(), 1);
-    let row = |rig: &Compiled, name: &str| {
-        rig.effects().iter().find(|row| row.name == name).cloned().expect("a row for each effect")
-    };
     for name in ["dark-current", "read-noise", "theta-zero", "distance", "gain[0]", "finite-beam"] {
         assert!(!row(&bare, name).included, "{name}");
     }
-    assert!(row(&bare, "finite-beam").how.contains("point-sampled"));
+    assert!(row(&bare, "finite-beam").how.contains("left out by request"));
     let mut rig = exact_rig();
     rig.detector.read_noise_a = 2e-13;
     rig.detector.gains[0].u_relative = 5e-4;

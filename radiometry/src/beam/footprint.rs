@@ -3,6 +3,8 @@
 
 use core::f64::consts::FRAC_PI_2;
 
+use glam::DVec3;
+
 use super::Beam;
 use crate::domain::{DomainError, within};
 
@@ -41,25 +43,63 @@ pub struct Footprint {
 pub fn footprint(beam: &Beam, theta_rad: f64) -> Result<Option<Footprint>, DomainError> {
     let theta = within("theta_rad", theta_rad, 0.0, FRAC_PI_2)?;
     let (sin, cos) = libm::sincos(theta);
-    // The reach along the axis is a line between the disks, and two beyond them.
+    Ok(of_tilt(beam, sin, cos))
+}
+
+/// As [`footprint`], of the sine and cosine of the angle between normal and axis.
+pub(super) fn of_tilt(beam: &Beam, sin: f64, cos: f64) -> Option<Footprint> {
+    // The reach along the axis is convex: three lines, with the steepest at either end.
     let (stop, pupil) = (beam.stop_radius_m(), beam.pupil_radius_m());
     let (z_stop, h) = (beam.stop_z_m(), beam.separation_m());
-    let widening = (stop + pupil) / h;
-    // Away from the detector, before the stop: reach = r + k (z_stop - z).
-    let at_origin = stop + widening * z_stop;
-    let far = at_origin / (cos - widening * sin);
-    // Towards the detector: first the same line, falling; beyond the stop, from r to R.
-    let before_stop = at_origin / (cos + widening * sin);
-    let slope = (pupil - stop) / h;
-    let near = if before_stop * sin <= z_stop {
-        before_stop
-    } else {
-        (stop - slope * z_stop) / (cos - slope * sin)
+    let (steepest, between) = ((stop + pupil) / h, (pupil - stop) / h);
+    if cos <= steepest * sin || z_stop + h <= 0.0 {
+        return None;
+    }
+    // Where u cos θ meets the line r + slope (z - z_stop), with z = side u sin θ.
+    let meet = |slope: f64, side: f64| (stop - slope * z_stop) / (cos - side * slope * sin);
+    let on_side = |side: f64, first: f64, then: f64| {
+        let u = meet(first, side);
+        // Whether the line's part of the axis has ended before.
+        let has_passed = if side > 0.0 { u * sin > z_stop } else { -u * sin < z_stop };
+        if has_passed { meet(then, side) } else { u }
     };
-    let meets = cos > widening * sin && cos > slope * sin && near * sin < z_stop + h;
-    if !meets || !far.is_finite() || !near.is_finite() {
-        return Ok(None);
+    let far = if z_stop >= 0.0 { meet(-steepest, -1.0) } else { on_side(-1.0, between, -steepest) };
+    let near = if z_stop >= 0.0 { on_side(1.0, -steepest, between) } else { meet(between, 1.0) };
+    let is_before_pupil = near * sin < z_stop + h;
+    if !is_before_pupil || !far.is_finite() || !near.is_finite() {
+        return None;
     }
     let across_m = beam.reach_m(-far * sin).max(beam.reach_m(near * sin));
-    Ok(Some(Footprint { near_m: near, far_m: far, across_m }))
+    Some(Footprint { near_m: near, far_m: far, across_m })
+}
+
+impl Footprint {
+    /// Of a placed beam on the plane z = 0, from where its axis meets that: see [`footprint`].
+    /// `None` also for an axis that never meets it.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use radiometry::beam::{Beam, Footprint};
+    /// let beam = Beam::of_spot(0.00625, 0.0025, 0.3)?;
+    /// // Straight from above it is the spot, also where that stands a little off the plane.
+    /// let on = Footprint::on_plane(&beam, DVec3::ZERO, DVec3::Z).expect("it meets the plane");
+    /// assert_eq!(on.far_m, 0.0025);
+    /// let above = Footprint::on_plane(&beam, DVec3::Z * 0.01, DVec3::Z).expect("so does this");
+    /// assert!((above.far_m - (0.0025 + 0.01 * 0.00875 / 0.3)).abs() < 1e-15);
+    /// # Ok::<(), radiometry::DomainError>(())
+    /// ```
+    pub fn on_plane(beam: &Beam, spot: DVec3, direction: DVec3) -> Option<Self> {
+        let cos = direction.z;
+        if cos <= 0.0 {
+            return None;
+        }
+        let sin = libm::hypot(direction.x, direction.y);
+        // The origin, moved along the axis to where that meets the plane.
+        of_tilt(&beam.with_origin_moved(-spot.z / cos), sin, cos)
+    }
+
+    /// The largest distance of any point.
+    pub fn radius_m(&self) -> f64 {
+        libm::hypot(self.near_m.max(self.far_m), self.across_m)
+    }
 }

@@ -87,6 +87,13 @@ impl Beam {
         })
     }
 
+    /// The same beam, its origin moved along the axis towards the detector (away for a negative
+    /// number).
+    #[must_use]
+    pub fn with_origin_moved(self, towards_detector_m: f64) -> Self {
+        Self { stop_z_m: self.stop_z_m - towards_detector_m, ..self }
+    }
+
     /// Of the disk at the detector, metres.
     pub const fn pupil_radius_m(&self) -> f64 {
         self.pupil_radius_m

@@ -43,7 +43,7 @@ pub struct Moments {
 }
 
 /// Nodes and weights on the unit disk, exact for polynomials in x and y up to `degree`; the weights
-/// sum to one. Degree 0 and 1: the centre alone.
+/// sum to one. Degree 0 and 1: the centre alone. Each ring begins on the x axis.
 /// Who needs it: [`BeamRule`] on pupil and spot.
 ///
 /// ```
@@ -63,7 +63,7 @@ pub fn disk_rule(degree: usize) -> Vec<(DVec2, f64)> {
     for (t, weight) in gauss_legendre(rings) {
         let radius = f64::midpoint(1.0, t).sqrt();
         for k in 0..spokes {
-            let angle = core::f64::consts::TAU * (k as f64 + 0.5) / spokes as f64;
+            let angle = core::f64::consts::TAU * k as f64 / spokes as f64;
             let (sin, cos) = libm::sincos(angle);
             let node = DVec2::new(radius * cos, radius * sin);
             nodes.push((node, weight / 2.0 / spokes as f64));
