@@ -22,8 +22,8 @@ rig = "rig.toml"
 scene = "scene.toml"
 
 [region]
-x_mm = [-2, 2]
-y_mm = [-2, 2]
+x_mm = [-1, 1]
+y_mm = [-1, 1]
 theta_max_deg = 80
 
 [schedule]
@@ -36,7 +36,7 @@ order = "travel"
 
 [dwell]
 dwell_ms = 20
-gain = "1 uA"
+gain = "10 nA"
 
 [dark]
 method = "shutter"
@@ -108,8 +108,8 @@ fn the_stated_uncertainty_covers_the_truth() {
 fn what_remains_when_the_scale_is_known_exactly_covers_the_truth_too() {
     let bench = lobe()
         .with("rig.toml", "u_distance_mm = 0.3", "u_distance_mm = 0")
-        .with("rig.toml", "u_pupil_diameter_mm = 0.01", "u_pupil_diameter_mm = 0")
-        .with("rig.toml", "u_spot_diameter_mm = 0.01", "u_spot_diameter_mm = 0")
+        .with("rig.toml", "u_pupil_diameter_mm = 0.004", "u_pupil_diameter_mm = 0")
+        .with("rig.toml", "u_spot_diameter_mm = 0.002", "u_spot_diameter_mm = 0")
         .with("rig.toml", "u_responsivity_relative = 0.005", "u_responsivity_relative = 0")
         .with("rig.toml", "u_relative = 0.0005", "u_relative = 0");
     honest(&scores(&bench));

@@ -17,7 +17,7 @@ use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
 use crate::field::{Field, Ray};
 use crate::mechanics::{self, AxisTruth, Kinematics, Moment};
-use crate::optics::{Axis, Light, Optics};
+use crate::optics::{Axis, FINITE_BEAM, Light, Optics, PointSampled};
 use crate::stage::Stages;
 use crate::time;
 use crate::{Nominal, NominalDetector, Quantity, Region, Scene, Simulated, Terms, Truth};
@@ -136,9 +136,9 @@ pub fn compile(
     candidates.extend(time::candidates(&setting));
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
-    let departing = detector::departing(&nominal.detector, &chosen);
     let (region, optics) = (setting.region, light.optics(&setting, &chosen));
     let field = Arc::clone(&setting.field);
+    let departing = detector::departing(&nominal.detector, &chosen);
     let (responsivity, throughput) = draw_optics(&departing, terms.seed)?;
     Ok(Compiled {
         current_per_radiance: responsivity * throughput,
@@ -231,6 +231,25 @@ impl Compiled {
         &self.chosen.rows
     }
 
+    /// The same rig with one of its effects left out, and nothing else changed: to see what that
+    /// effect does, or what it costs. `None` for what is not in, or is part of what a reading is.
+    pub fn less(&self, effect: &str) -> Option<Self> {
+        let mut less = self.clone();
+        less.chosen = self.chosen.less(effect)?;
+        let departing = detector::departing(&self.nominal.detector, &less.chosen);
+        // What was drawn before was sound; less of it is.
+        let (responsivity, throughput) = draw_optics(&departing, self.seed).ok()?;
+        less.responsivity = responsivity;
+        less.current_per_radiance = responsivity * throughput;
+        less.amplifier = draw_amplifier(&departing, self.seed).ok()?;
+        less.axes = mechanics::axes(&self.nominal, &self.simulated, self.seed, &less.chosen);
+        less.kinematics = mechanics::kinematics(&self.simulated, self.seed, &less.chosen);
+        if !less.chosen.has(FINITE_BEAM) {
+            less.optics = Arc::new(PointSampled(Arc::clone(&self.field)));
+        }
+        Some(less)
+    }
+
     /// What emits.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -260,6 +279,11 @@ impl Compiled {
     /// What leaves the sample, over a region.
     pub fn truth(&self, region: Region) -> Truth<'_> {
         Truth::new(&self.scene, region)
+    }
+
+    /// ADC readings a second.
+    pub fn adc_rate_hz(&self) -> u32 {
+        self.nominal.detector.adc_rate_hz
     }
 
     /// Photocurrent per radiance as drawn, A per W·m⁻²·sr⁻¹ (or per cd·m⁻²).

@@ -15,6 +15,8 @@ pub struct EffectRow {
     pub name: String,
     /// Whether it is a stage of the compiled rig. What is not has no code that runs.
     pub included: bool,
+    /// Whether it can be left out: it is not part of what a reading is.
+    pub can_be_left_out: bool,
     /// The key of scene, rig or `[simulated]` table that calls for it, or a fact found while
     /// compiling. `None`: nothing does.
     pub cause: Option<String>,
@@ -150,6 +152,20 @@ impl Chosen {
     pub(crate) fn has(&self, name: &str) -> bool {
         self.included.contains(name)
     }
+
+    /// The same without one that is in and need not be.
+    pub(crate) fn less(&self, name: &str) -> Option<Self> {
+        let mut less = self.clone();
+        let row = less.rows.iter_mut().find(|row| row.name == name)?;
+        if !row.included || !row.can_be_left_out {
+            return None;
+        }
+        row.included = false;
+        row.error = None;
+        "left out by request".clone_into(&mut row.how);
+        less.included.remove(name);
+        Some(less)
+    }
 }
 
 /// Why an effect is in or out.
@@ -215,6 +231,7 @@ pub(crate) fn decide(
 
 fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
     let bound = candidate.bound();
+    let can_be_left_out = !matches!(candidate.influence, Influence::Mandatory(_));
     let Candidate { name, cause, error, how_in, how_out, .. } = candidate;
     let how = match why {
         Why::CalledFor => how_in,
@@ -229,7 +246,7 @@ fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
     };
     let included = matches!(why, Why::CalledFor | Why::Forced);
     let error = error.filter(|_| included);
-    EffectRow { name, included, cause, bound, error, cost_ns: None, how }
+    EffectRow { name, included, can_be_left_out, cause, bound, error, cost_ns: None, how }
 }
 
 /// Names that are none, and wishes that can't be granted.

@@ -79,6 +79,8 @@ pub(crate) struct Patch {
     pub(crate) boundary: Boundary,
     /// A place within. Its radiance goes with direction alone.
     pub(crate) place: DVec2,
+    /// Whether its radiance is the same all round the normal.
+    pub(crate) is_round: bool,
     /// Its radiance, where that is one in all places and directions.
     pub(crate) uniform: Option<f64>,
 }
@@ -144,7 +146,8 @@ impl Field for Scene {
             let is_even = matches!(emitter.law(), Law::Lambertian);
             let uniform = is_even.then(|| emitter.radiance_into(x, y, DVec3::Z));
             let place = boundary.place_within();
-            Some(Patch { name: format!("emitter[{i}]"), place, boundary, uniform })
+            let (name, is_round) = (format!("emitter[{i}]"), emitter.law().is_round());
+            Some(Patch { name, boundary, place, is_round, uniform })
         };
         self.emitters().iter().enumerate().map(patch).collect()
     }

@@ -21,6 +21,7 @@ mod mechanics;
 mod nominal;
 mod optics;
 mod pty;
+mod sampler;
 mod scene;
 mod serve;
 mod simulated;
@@ -42,6 +43,7 @@ pub use mechanics::{
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use optics::Axis;
 pub use pty::Pty;
+pub use sampler::Sampler;
 pub use scene::{
     Batwing, Body, EXPONENT_MAX, Emitter, Image, LOBE_EXPONENT_MIN, Lamp, LampSource, Law, Load,
     Lobe, Lobes, Outline, Reflection, SHARPNESS_MAX, Scene, SceneError, Shape, Solid, Surface,

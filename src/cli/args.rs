@@ -119,12 +119,29 @@ pub(crate) struct RigArgs {
     pub(crate) seed: u64,
 }
 
+/// Which of a simulated rig's effects are in and out.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct EffectArgs {
+    /// How much all effects that are left out may change a reading, relative to it. Default: a
+    /// tenth of the predicted noise of one dwell.
+    #[arg(long, value_name = "T")]
+    pub(crate) tolerance: Option<f64>,
+    /// Simulate this effect however little it matters; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub(crate) force: Vec<String>,
+    /// Leave this effect out however much it matters; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub(crate) without: Vec<String>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
     /// The plan.
     pub(crate) plan: PathBuf,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    #[command(flatten)]
+    pub(crate) effects: EffectArgs,
     /// The run's folder; must not exist yet. Default: runs/NAME-UTC.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -235,9 +252,11 @@ pub(crate) struct ExplainArgs {
     /// The rig that looks at it. Default: the plan's, or the built-in one.
     #[arg(long, value_name = "RIG")]
     pub(crate) rig: Option<PathBuf>,
-    /// The plan that measures it.
+    /// The plan that measures it: effects are weighed in its region, for its dwell and length.
     #[arg(long, value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) effects: EffectArgs,
     /// Print one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
@@ -247,6 +266,8 @@ pub(crate) struct ExplainArgs {
 pub(crate) struct SimArgs {
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    #[command(flatten)]
+    pub(crate) effects: EffectArgs,
     /// Make a symlink here that leads to the pseudo-terminal.
     #[arg(long, value_name = "LINK")]
     pub(crate) pty: Option<PathBuf>,

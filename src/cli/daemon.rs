@@ -38,7 +38,9 @@ fn open_shop(args: &DaemonArgs) -> Result<Shop, Failure> {
     let mut inputs = Inputs::from_disk();
     let rig = rig_at(&mut inputs, &args.rig)?;
     let stage = match (&args.scene, rig.is_simulated()) {
-        (Some(scene), true) => Some(stage_at(&mut inputs, scene, &rig, args.seed)?),
+        (Some(scene), true) => {
+            Some(stage_at(&mut inputs, scene, &rig, &sim::Terms::seeded(args.seed))?)
+        }
         (None, false) => None,
         (None, true) => {
             return Err(no_scene(&rig));

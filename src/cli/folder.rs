@@ -18,13 +18,17 @@ pub(crate) fn default_folder(name: &str) -> PathBuf {
     Path::new("runs").join(format!("{name}-{}", utc_stamp()))
 }
 
+/// The effects that a run's simulated rig is compiled to, one line each.
+pub(crate) fn effects(setup: &Setup) -> Vec<String> {
+    let rows = setup.stage.iter().flat_map(|stage| stage.compiled.effects());
+    let included = rows.filter(|row| row.included);
+    included
+        .map(|row| format!("{}: {}", row.name, row.cause.as_deref().unwrap_or("nothing")))
+        .collect()
+}
+
 /// What is known of a run when it begins.
 pub(crate) fn header(setup: &Setup) -> Header {
-    let effects = setup.stage.as_ref().map_or_else(Vec::new, |stage| {
-        let rows = stage.compiled.effects().iter().filter(|row| row.included);
-        rows.map(|row| format!("{}: {}", row.name, row.cause.as_deref().unwrap_or("nothing")))
-            .collect()
-    });
     Header {
         program_version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: setup.seed,
@@ -33,7 +37,8 @@ pub(crate) fn header(setup: &Setup) -> Header {
         plan_name: setup.plan_name.clone(),
         plan_hash: setup.plan_hash.to_string(),
         started_utc: utc_now(),
-        effects,
+        effects: effects(setup),
+        effect_wishes: setup.wishes.clone(),
     }
 }
 

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde_json::json;
 
 use super::acquire::{Acquired, Pace, acquire};
-use super::args::FrontierArgs;
+use super::args::{EffectArgs, FrontierArgs};
 use super::failure::{Failure, Outcome};
 use super::folder::create;
 use super::output::{say, write_out};
@@ -35,7 +35,7 @@ type Entry = (usize, u64);
 
 /// Runs the ladder, writes frontier.csv and frontier.svg, and prints the table.
 pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
-    let setup = Setup::from_disk(&args.plan, &args.rig)?;
+    let setup = Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?;
     if setup.stage.is_none() {
         return Err(Failure::with_help(
             format!("{}: errors are known on a simulated rig alone", setup.rig.name),

@@ -145,7 +145,7 @@ impl Bench {
             return Ok(Self { rig, stage: None });
         }
         let scene = args.rig.scene.as_ref().ok_or_else(|| no_scene(&rig))?;
-        let stage = stage_at(&mut inputs, scene, &rig, args.rig.seed)?;
+        let stage = stage_at(&mut inputs, scene, &rig, &sim::Terms::seeded(args.rig.seed))?;
         Ok(Self { rig, stage: Some(stage) })
     }
 

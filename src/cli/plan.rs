@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use serde_json::json;
 
-use super::args::PlanArgs;
+use super::args::{EffectArgs, PlanArgs};
 use super::failure::Outcome;
 use super::outlook::{outlook, warning};
 use super::output::{note, say, say_json};
@@ -15,7 +15,7 @@ use crate::rig::AXES;
 
 /// Checks a plan and prints its prediction.
 pub(crate) fn plan(args: &PlanArgs) -> Outcome {
-    let setup = Setup::from_disk(&args.plan, &args.rig)?;
+    let setup = Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?;
     let prediction = &setup.sequence.prediction;
     if args.json {
         say_json(&as_json(&setup, prediction))?;

@@ -68,7 +68,7 @@ fn bundle(path: &std::path::Path) -> Result<Bundle, Failure> {
         let rig: Rig = rig_at(&mut inputs, &rig_path)?;
         if let Some(scene) = plan.scene.as_deref().filter(|_| rig.is_simulated()) {
             // Reading it is what finds the files that it names.
-            stage_at(&mut inputs, &beside(path, scene), &rig, NO_SEED)?;
+            stage_at(&mut inputs, &beside(path, scene), &rig, &sim::Terms::seeded(NO_SEED))?;
         }
     }
     let name = plan.name.clone().unwrap_or_else(|| super::setup::folder_name(path));

@@ -158,7 +158,8 @@ pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), F
     let reader = Reader::open(&folder.join(JOURNAL))?;
     let header = reader.header()?;
     let name = Some(header.plan_name.clone());
-    let setup = Setup::from_inputs(reader.inputs()?, name, header.seed)?;
+    let setup =
+        Setup::from_inputs(reader.inputs()?, name, header.seed, header.effect_wishes.clone())?;
     let readings = reader.readings(Order::Taken)?;
     Ok((setup, header, readings))
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::acquire::{Acquired, Pace, acquire};
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
-use super::folder::JOURNAL;
+use super::folder::{JOURNAL, effects};
 use super::output::note;
 use super::run::{Ending, finish, first_job};
 use super::setup::Setup;
@@ -48,7 +48,12 @@ fn nothing_left(folder: &Path, journal: Journal, left: &Remainder) -> Acquired {
 pub(crate) fn what_is_left(journal: &Path) -> Result<(Setup, Remainder), Failure> {
     let reader = Reader::open(journal)?;
     let header = reader.header()?;
-    let setup = Setup::from_inputs(reader.inputs()?, Some(header.plan_name), header.seed)?;
+    let setup = Setup::from_inputs(
+        reader.inputs()?,
+        Some(header.plan_name),
+        header.seed,
+        header.effect_wishes,
+    )?;
     let hash = setup.plan_hash.to_string();
     if hash != header.plan_hash {
         return Err(Failure::with_help(
@@ -56,6 +61,15 @@ pub(crate) fn what_is_left(journal: &Path) -> Result<(Setup, Remainder), Failure
                 "{}: its plan now means other readings ({hash}) than when it began ({})",
                 journal.display(),
                 header.plan_hash
+            ),
+            "use the version of gonio that began it",
+        ));
+    }
+    if effects(&setup) != header.effects {
+        return Err(Failure::with_help(
+            format!(
+                "{}: its scene now compiles to other effects than when it began",
+                journal.display()
             ),
             "use the version of gonio that began it",
         ));

@@ -28,7 +28,7 @@ pub(crate) struct Ending {
 /// The main job.
 pub(crate) fn run(args: &RunArgs) -> Outcome {
     let began = Instant::now();
-    let setup = Setup::from_disk(&args.plan, &args.rig)?;
+    let setup = Setup::from_disk(&args.plan, &args.rig, &args.effects)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&setup.plan_name));
     if folder.exists() {
         return Err(exists_already(&folder));

@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use spanned_toml::{Document, Source};
 
-use super::args::RigArgs;
+use super::args::{EffectArgs, RigArgs};
 use super::failure::Failure;
 use super::inputs::{BUILT_IN, Inputs, beside};
 use super::nominal::nominal;
-use crate::journal::{Input, InputRole};
+use crate::journal::{EffectWishes, Input, InputRole};
 use crate::plan::{Plan, PlanHash, Region, Sequence};
 use crate::rig::Rig;
 
@@ -37,22 +37,35 @@ pub(crate) struct Setup {
     /// `None` for a real rig.
     pub(crate) stage: Option<Stage>,
     pub(crate) seed: u64,
+    /// What was wanted of a simulated rig's effects.
+    pub(crate) wishes: EffectWishes,
     /// The files, byte for byte.
     pub(crate) inputs: Vec<Input>,
 }
 
-/// Which files, beyond what the plan names.
+/// What is chosen beyond what the plan names.
 #[derive(Debug, Clone, Default)]
 struct Choice {
     rig: Option<PathBuf>,
     scene: Option<PathBuf>,
+    seed: u64,
+    wishes: EffectWishes,
 }
 
 impl Setup {
     /// From the files on the disk.
-    pub(crate) fn from_disk(plan: &Path, args: &RigArgs) -> Result<Self, Failure> {
-        let choice = Choice { rig: args.rig.clone(), scene: args.scene.clone() };
-        Self::build(Inputs::from_disk(), plan, &choice, None, args.seed)
+    pub(crate) fn from_disk(
+        plan: &Path,
+        args: &RigArgs,
+        effects: &EffectArgs,
+    ) -> Result<Self, Failure> {
+        let choice = Choice {
+            rig: args.rig.clone(),
+            scene: args.scene.clone(),
+            seed: args.seed,
+            wishes: effects.wishes(),
+        };
+        Self::build(Inputs::from_disk(), plan, choice, None)
     }
 
     /// From what was read before: a journal's inputs, or a client's. `plan_name` is what the run
@@ -61,37 +74,38 @@ impl Setup {
         inputs: Vec<Input>,
         plan_name: Option<String>,
         seed: u64,
+        wishes: EffectWishes,
     ) -> Result<Self, Failure> {
-        let choice = Choice::default();
-        Self::build(Inputs::from_memory(inputs), Path::new("plan.toml"), &choice, plan_name, seed)
+        let choice = Choice { seed, wishes, ..Choice::default() };
+        Self::build(Inputs::from_memory(inputs), Path::new("plan.toml"), choice, plan_name)
     }
 
     /// The same rig and scene under another plan: a rung of a ladder.
     pub(crate) fn with_plan(&self, plan: Plan, seed: u64) -> Result<Self, Failure> {
         let sequence = plan.lay_out(&self.rig, self.list.as_ref())?;
         let plan_hash = plan.hash(&sequence);
-        let stage =
-            self.stage.as_ref().map(|stage| stage.with_seed(&self.rig, seed)).transpose()?;
+        let terms = terms_of(&plan, &sequence, seed, &self.wishes);
+        let stage = self.stage.as_ref();
+        let stage = stage.map(|stage| stage.on_terms(&self.rig, &terms)).transpose()?;
         Ok(Self { plan, plan_hash, sequence, stage, seed, ..self.clone() })
     }
 
     fn build(
         mut inputs: Inputs,
         plan_path: &Path,
-        choice: &Choice,
+        choice: Choice,
         plan_name: Option<String>,
-        seed: u64,
     ) -> Result<Self, Failure> {
         let plan = Plan::read(inputs.document(InputRole::Plan, plan_path)?)?;
         let plan_name = plan.name.clone().or(plan_name).unwrap_or_else(|| folder_name(plan_path));
-        let rig = read_rig(&mut inputs, plan_path, &plan, choice)?;
-        let list = plan.list_file().map(|name| read_list(&mut inputs, plan_path, &plan, name));
-        let list = list.transpose()?;
-        let sequence = plan.lay_out(&rig, list.as_ref())?;
+        let rig = read_rig(&mut inputs, plan_path, &plan, &choice)?;
+        let (list, sequence) = lay_out(&mut inputs, plan_path, &plan, &rig)?;
         let plan_hash = plan.hash(&sequence);
-        let stage = read_stage(&mut inputs, plan_path, &plan, choice, &rig, seed)?;
-        let inputs = inputs.read().to_vec();
-        Ok(Self { plan, plan_name, plan_hash, rig, sequence, list, stage, seed, inputs })
+        let Choice { seed, ref wishes, .. } = choice;
+        let terms = terms_of(&plan, &sequence, seed, wishes);
+        let stage = read_stage(&mut inputs, plan_path, &plan, &choice, &rig, &terms)?;
+        let (inputs, wishes) = (inputs.read().to_vec(), choice.wishes);
+        Ok(Self { plan, plan_name, plan_hash, rig, sequence, list, stage, seed, wishes, inputs })
     }
 
     /// The fit's region.
@@ -101,17 +115,70 @@ impl Setup {
 
     /// What is true, on a simulated rig.
     pub(crate) fn truth(&self) -> Option<sim::Truth<'_>> {
-        let region = self.region();
-        let region =
-            sim::Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad };
+        let region = region_of(&self.plan);
         self.stage.as_ref().map(|stage| stage.compiled.truth(region))
     }
 }
 
 impl Stage {
-    fn with_seed(&self, rig: &Rig, seed: u64) -> Result<Self, Failure> {
-        compile(self.compiled.scene().clone(), rig, seed)
+    pub(crate) fn on_terms(&self, rig: &Rig, terms: &sim::Terms) -> Result<Self, Failure> {
+        compile(self.compiled.scene().clone(), rig, terms)
     }
+}
+
+impl EffectArgs {
+    /// As they are recorded.
+    pub(crate) fn wishes(&self) -> EffectWishes {
+        let (force, without) = (self.force.clone(), self.without.clone());
+        EffectWishes { tolerance: self.tolerance, force, without, ignores_plan: false }
+    }
+
+    /// On which a rig is compiled where no plan is known.
+    pub(crate) fn terms(&self, seed: u64) -> sim::Terms {
+        terms_without_plan(seed, &self.wishes())
+    }
+}
+
+fn terms_without_plan(seed: u64, wishes: &EffectWishes) -> sim::Terms {
+    let EffectWishes { tolerance, force, without, .. } = wishes.clone();
+    sim::Terms { tolerance, force, without, ..sim::Terms::seeded(seed) }
+}
+
+/// On which terms a plan's rig is compiled.
+pub(crate) fn terms_of(
+    plan: &Plan,
+    sequence: &Sequence,
+    seed: u64,
+    wishes: &EffectWishes,
+) -> sim::Terms {
+    let terms = terms_without_plan(seed, wishes);
+    if wishes.ignores_plan {
+        return terms;
+    }
+    sim::Terms {
+        region: Some(region_of(plan)),
+        dwell_s: plan.dwell.as_secs_f64(),
+        run_s: sequence.prediction.total_s(),
+        ..terms
+    }
+}
+
+fn region_of(plan: &Plan) -> sim::Region {
+    let Region { x_m, y_m, theta_max_rad } = plan.region;
+    sim::Region { x_m, y_m, theta_max_rad }
+}
+
+/// A plan's list of poses, if it has one, and its readings.
+pub(crate) fn lay_out(
+    inputs: &mut Inputs,
+    plan_path: &Path,
+    plan: &Plan,
+    rig: &Rig,
+) -> Result<(Option<Source>, Sequence), Failure> {
+    let list = plan.list_file().map(|name| read_list(inputs, plan_path, plan, name));
+    let list = list.transpose()?;
+    let sequence = plan.lay_out(rig, list.as_ref())?;
+    Ok((list, sequence))
 }
 
 /// Reads the plan's list of poses.
@@ -192,7 +259,7 @@ fn read_stage(
     plan: &Plan,
     choice: &Choice,
     rig: &Rig,
-    seed: u64,
+    terms: &sim::Terms,
 ) -> Result<Option<Stage>, Failure> {
     if !rig.is_simulated() {
         return match &choice.scene {
@@ -215,7 +282,7 @@ fn read_stage(
         }
     };
     super::run::check_simulated(plan)?;
-    Ok(Some(stage_at(inputs, &path, rig, seed)?))
+    Ok(Some(stage_at(inputs, &path, rig, terms)?))
 }
 
 /// The refusal of a simulated rig that nobody gave anything to look at.
@@ -231,23 +298,29 @@ pub(crate) fn stage_at(
     inputs: &mut Inputs,
     path: &Path,
     rig: &Rig,
-    seed: u64,
+    terms: &sim::Terms,
 ) -> Result<Stage, Failure> {
     let document: Document = inputs.document(InputRole::Scene, path)?;
+    if document.root().has("schedule") {
+        return Err(Failure::with_help(
+            format!("{}: is a plan, not a scene", path.display()),
+            "give the scene that the plan names; a plan goes with --plan",
+        ));
+    }
     let inputs = RefCell::new(inputs);
     let load = |name: &str| inputs.borrow_mut().attachment(path, name);
     let scene = sim::Scene::read(&document, nominal(rig).quantity, &load)?;
-    compile(scene, rig, seed)
+    compile(scene, rig, terms)
 }
 
-fn compile(scene: sim::Scene, rig: &Rig, seed: u64) -> Result<Stage, Failure> {
+fn compile(scene: sim::Scene, rig: &Rig, terms: &sim::Terms) -> Result<Stage, Failure> {
     let root = rig.document().root();
     let simulated = root.table("simulated")?.map(sim::Simulated::read).transpose()?;
     let simulated = simulated.unwrap_or_default();
     let faults = simulated.faults;
-    let compiled = sim::compile(scene, nominal(rig), simulated, &sim::Terms::seeded(seed))
+    let compiled = sim::compile(scene, nominal(rig), simulated, terms)
         .map_err(|error| Failure::start(format!("{}: {error}", rig.document().source().name())))?;
-    Ok(Stage { compiled: Arc::new(compiled), faults, seed })
+    Ok(Stage { compiled: Arc::new(compiled), faults, seed: terms.seed })
 }
 
 /// A plan without a name is called after its folder.

@@ -17,7 +17,7 @@ use super::setup::{Setup, Stage};
 use super::stopping;
 use super::text::with_uncertainty;
 use crate::daemon::{Checked, Finished, Prepared, Refusal, Workshop};
-use crate::journal::{Input, InputRole, Journal, JournalError, Reader, Writer};
+use crate::journal::{EffectWishes, Input, InputRole, Journal, JournalError, Reader, Writer};
 use crate::rig::Rig;
 use crate::run::OnFault;
 use crate::run::resume::rule_met;
@@ -54,7 +54,9 @@ impl Shop {
         let theirs =
             sent.into_iter().filter(|i| matches!(i.role, InputRole::Plan | InputRole::Attachment));
         let inputs = self.inputs.iter().cloned().chain(theirs).collect();
-        let setup = Setup::from_inputs(inputs, name, self.seed)
+        // The rig was compiled when the daemon began, before any plan.
+        let wishes = EffectWishes { ignores_plan: true, ..EffectWishes::default() };
+        let setup = Setup::from_inputs(inputs, name, self.seed, wishes)
             .map_err(|failure| Refusal::new(failure.text()))?;
         Ok((setup, notes))
     }

@@ -70,7 +70,7 @@ pub(crate) fn sim(args: &SimArgs) -> Outcome {
     let path = args.rig.rig.clone().unwrap_or_else(|| BUILT_IN.into());
     let rig = rig_at(&mut inputs, &path)?;
     let scene = args.rig.scene.as_ref().ok_or_else(|| no_scene(&rig))?;
-    let stage = stage_at(&mut inputs, scene, &rig, args.rig.seed)?;
+    let stage = stage_at(&mut inputs, scene, &rig, &args.effects.terms(args.rig.seed))?;
     let baud = args.baud.unwrap_or_else(|| rig.link.baud());
     let runtime = Pace::Real.runtime()?;
     runtime.block_on(serve_on_pty(args, &stage, baud))

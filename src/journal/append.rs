@@ -260,6 +260,8 @@ fn fill(
     let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
     schema::create(&transaction)?;
     let effects = serde_json::Value::from(header.effects.clone()).to_string();
+    // Names and numbers always have a form as JSON.
+    let wishes = serde_json::to_string(&header.effect_wishes).unwrap_or_default();
     for (key, value) in [
         ("program_version", header.program_version.as_str()),
         ("seed", &header.seed.to_string()),
@@ -269,6 +271,7 @@ fn fill(
         ("plan_hash", &header.plan_hash),
         ("started_utc", &header.started_utc),
         ("effects", &effects),
+        ("effect_wishes", &wishes),
     ] {
         transaction.execute("INSERT INTO meta VALUES (?1, ?2)", params![key, value])?;
     }

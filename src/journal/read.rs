@@ -6,8 +6,8 @@ use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ValueRef};
 use rusqlite::{Connection, OptionalExtension, Row};
 
 use super::{
-    Event, EventKind, Header, Input, InputRole, JournalError, ReferenceCheck, Session, Verdict,
-    schema, steps,
+    EffectWishes, Event, EventKind, Header, Input, InputRole, JournalError, ReferenceCheck,
+    Session, Verdict, schema, steps,
 };
 use crate::plan::Step;
 use crate::rig::{Latched, Reading, ReadingKind};
@@ -67,16 +67,17 @@ impl Reader {
             path: self.path.clone(),
             detail: format!("meta: {key}: missing or not as this program writes it"),
         };
-        let text = |key: &str| {
+        let found = |key: &str| {
             self.connection
                 .query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))
                 .optional()
-                .map_err(|error| self.fail(&error))?
-                .ok_or_else(|| corrupt(key))
+                .map_err(|error| self.fail(&error))
         };
+        let text = |key: &str| found(key)?.ok_or_else(|| corrupt(key));
         let seed: String = text("seed")?;
         let simulated: String = text("simulated")?;
         let effects: String = text("effects")?;
+        let wishes: Option<String> = found("effect_wishes")?;
         Ok(Header {
             program_version: text("program_version")?,
             seed: seed.parse().map_err(|_| corrupt("seed"))?,
@@ -86,6 +87,11 @@ impl Reader {
             plan_hash: text("plan_hash")?,
             started_utc: text("started_utc")?,
             effects: serde_json::from_str(&effects).map_err(|_| corrupt("effects"))?,
+            // Runs from before there were any have none.
+            effect_wishes: wishes.map_or_else(
+                || Ok(EffectWishes::default()),
+                |wishes| serde_json::from_str(&wishes).map_err(|_| corrupt("effect_wishes")),
+            )?,
         })
     }
 

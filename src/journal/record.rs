@@ -3,7 +3,7 @@
 use crate::rig::Reading;
 
 /// What is known when a run begins, and never changes.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// The program's version.
     pub program_version: String,
@@ -21,6 +21,22 @@ pub struct Header {
     pub started_utc: String,
     /// The effects that the scene called for, one line each; empty on hardware.
     pub effects: Vec<String>,
+    /// What a person wanted of the effects, so that a resume compiles the same rig.
+    pub effect_wishes: EffectWishes,
+}
+
+/// What a person wanted of a simulated rig's effects beyond what the plan implies.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct EffectWishes {
+    /// How much all that is left out may change a reading; by the plan's noise if `None`.
+    pub tolerance: Option<f64>,
+    /// Effects that are in whatever they amount to.
+    pub force: Vec<String>,
+    /// Effects that are out whatever they amount to.
+    pub without: Vec<String>,
+    /// Whether they were weighed before any plan was known, as a daemon's rig is.
+    #[serde(default)]
+    pub ignores_plan: bool,
 }
 
 /// What an input file is to its run.

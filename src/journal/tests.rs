@@ -38,7 +38,13 @@ fn header() -> Header {
         plan_name: "lüster".into(),
         plan_hash: "00ff".into(),
         started_utc: "2026-11-22T01:02:03Z".into(),
-        effects: vec!["lambertian patch: the scene's emitter 1".into(), "shot noise".into()],
+        effects: vec!["emission[0]: emitter[0].kind".into(), "shot-noise: electrons".into()],
+        effect_wishes: EffectWishes {
+            tolerance: Some(1.0 / 3.0),
+            force: vec!["finite-beam".into()],
+            without: Vec::new(),
+            ignores_plan: false,
+        },
     }
 }
 

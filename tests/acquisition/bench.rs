@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use firmware_protocol::Shutter;
 use gonio::device::Opener;
-use gonio::journal::{Header, Journal, Writer};
+use gonio::journal::{EffectWishes, Header, Journal, Writer};
 use gonio::plan::Step;
 use gonio::rig::{AxisPositions, Latched, ReadingKind, Rig};
 use gonio::run::{Happening, OwnerHandle, RunEvent, State, own};
@@ -78,6 +78,7 @@ impl Folder {
             plan_hash: "00".into(),
             started_utc: "2026-01-01T00:00:00Z".into(),
             effects: Vec::new(),
+            effect_wishes: EffectWishes::default(),
         };
         Writer::inline(Journal::create(&self.path(), &header, &[], steps).unwrap())
     }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use benches::{Arguments, Section, Spread, Table, Unmeasured, repeat, report, timed};
 use clap::Parser;
-use gonio::journal::{Header, Journal, Record, Writer};
+use gonio::journal::{EffectWishes, Header, Journal, Record, Writer};
 use gonio::rig::{Latched, Reading, ReadingKind};
 
 /// Committed readings a second to aim at.
@@ -190,6 +190,7 @@ fn header() -> Header {
         plan_hash: "00".into(),
         started_utc: "2026-01-01T00:00:00Z".into(),
         effects: Vec::new(),
+        effect_wishes: EffectWishes::default(),
     }
 }
 

@@ -22,7 +22,7 @@ use crate::field::{Field, Ray};
 use weigh::{Form, Weighed};
 
 /// The name of the effect that not the axis alone is seen.
-const FINITE_BEAM: &str = "finite-beam";
+pub(crate) const FINITE_BEAM: &str = "finite-beam";
 
 /// Where the detector stands, sample's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

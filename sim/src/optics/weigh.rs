@@ -25,15 +25,17 @@ const DEGREES: [usize; 5] = [3, 5, 7, 9, 14];
 const FINEST: usize = 20;
 /// The degree of the pupil's rule that sees slivers of a beam.
 const SLIVERS: usize = 25;
+/// From here on a dozen points of the pupil tell as much.
+const NO_SLIVER: f64 = 1e-2;
 /// What even that may miss of a beam that reaches an outline: the outermost hundredth of the
 /// pupil, which looks over it with less than a thousandth of the stop.
 const SLIVER: f64 = 1e-9;
 /// Directions round the normal.
-const AZIMUTHS: u32 = 48;
+const AZIMUTHS: u32 = 32;
 /// Polar angles at most.
 const POLAR_MAX: f64 = 400.0;
 /// How many of the strongest departures are looked at again with finer rules.
-const WORST: usize = 24;
+const WORST: usize = 8;
 
 /// How the beam will be averaged.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +96,6 @@ impl Weighed {
     /// The cheapest form whose error stays within half the tolerance, as far as it can be had,
     /// and that error.
     pub(crate) fn form(&self, setting: &Setting<'_>) -> (Form, f64) {
-        let rays = inside_rays(setting, &self.beam);
         let Some(patches) = setting.field.patches() else {
             let landmarks = setting.field.landmarks(&setting.region);
             let build = |degree| self.build(setting, Form::Rays(degree));
@@ -104,6 +105,7 @@ impl Weighed {
         let (mut inside, mut inside_error) = (DEGREES[0], 0.0_f64);
         for patch in patches.iter().filter(|patch| patch.uniform.is_none()) {
             let field = of_patch(setting, patch);
+            let rays = inside_rays(setting, &self.beam, patch.is_round);
             let (degree, error) = cheapest(setting, &rays, |degree| {
                 Arc::new(ByRays::new(Arc::clone(&field), self.beam, degree))
             });
@@ -142,7 +144,7 @@ fn over_patches(setting: &Setting<'_>, beam: &Beam, patches: &[Patch]) -> (f64, 
     // No outline crosses the region: one patch at most holds all of it.
     let holding = patches.iter().find(|patch| patch.boundary.holds(place));
     if let Some(patch) = holding.filter(|patch| patch.uniform.is_none()) {
-        let (field, rays) = (of_patch(setting, patch), inside_rays(setting, beam));
+        let (field, rays) = (of_patch(setting, patch), inside_rays(setting, beam, patch.is_round));
         let optics = ByRays::new(Arc::clone(&field), *beam, DEGREES[1]);
         bound = largest(setting, &optics, &PointSampled(field), &rays);
         fact = "radiance goes with direction within the beam".to_owned();
@@ -178,6 +180,10 @@ fn largest_across(setting: &Setting<'_>, beam: &Beam, patches: &[Patch]) -> f64 
     let over = |pupil| OverPatches::new(&setting.field, patches.to_vec(), *beam, DEGREES[1], pupil);
     let point = PointSampled(Arc::clone(&setting.field));
     let rays = across_rays(setting, beam, patches);
+    let coarse = largest(setting, &over(DEGREES[1]), &point, &rays);
+    if coarse > NO_SLIVER {
+        return coarse;
+    }
     largest(setting, &over(SLIVERS), &point, &rays).max(SLIVER)
 }
 
@@ -221,17 +227,19 @@ fn cheapest(
     best
 }
 
-/// From the region's middle into all its directions, a quarter of the beam's angle apart.
-fn inside_rays(setting: &Setting<'_>, beam: &Beam) -> Vec<Ray> {
+/// From the region's middle into all its directions, a quarter of the beam's angle apart; into one
+/// azimuth where all are alike.
+fn inside_rays(setting: &Setting<'_>, beam: &Beam, is_round: bool) -> Vec<Ray> {
     let Region { x_m, y_m, theta_max_rad } = setting.region;
     let angle = (beam.pupil_radius_m() + beam.stop_radius_m()) / beam.separation_m();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 400
     let polar = libm::ceil(theta_max_rad / (angle / 4.0)).clamp(1.0, POLAR_MAX) as u32;
     let (x, y) = (f64::midpoint(x_m.0, x_m.1), f64::midpoint(y_m.0, y_m.1));
+    let azimuths = if is_round { 1 } else { AZIMUTHS };
     let mut rays = vec![Ray::new(x, y, 0.0, 0.0)];
     for i in 1..=polar {
         let theta = theta_max_rad * f64::from(i) / f64::from(polar);
-        let ring = (0..AZIMUTHS).map(|j| TAU * f64::from(j) / f64::from(AZIMUTHS));
+        let ring = (0..azimuths).map(|j| TAU * f64::from(j) / f64::from(azimuths));
         rays.extend(ring.map(|phi| Ray::new(x, y, theta, phi)));
     }
     rays
