@@ -243,6 +243,7 @@ impl Compiled {
         less.current_per_radiance = responsivity * throughput;
         less.amplifier = draw_amplifier(&departing, self.seed).ok()?;
         less.axes = mechanics::axes(&self.nominal, &self.simulated, self.seed, &less.chosen);
+        less.moments = mechanics::moments(&self.nominal, &self.simulated, &less.chosen);
         less.kinematics = mechanics::kinematics(&self.simulated, self.seed, &less.chosen);
         if !less.chosen.has(FINITE_BEAM) {
             less.optics = Arc::new(PointSampled(Arc::clone(&self.field)));
