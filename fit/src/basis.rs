@@ -6,6 +6,7 @@
 //! polynomials other than the first have no exitance: that is why derived quantities are short sums.
 
 use crate::{FitError, Ray, Region};
+use glam::DVec3;
 use radiometry::DomainError;
 use radiometry::basis::zernike::ansi_order;
 use radiometry::basis::{Legendre, Zernike};
@@ -118,12 +119,37 @@ impl Basis {
 
     /// The position terms at the ray's foot.
     pub(crate) fn position(&self, ray: &Ray, scratch: &mut Scratch) {
-        let (x, y) = self.region.scaled(ray);
+        self.position_at(self.region.scaled(ray), scratch);
+    }
+
+    fn position_at(&self, (x, y): (f64, f64), scratch: &mut Scratch) {
         self.legendre.evaluate(x, &mut scratch.x);
         self.legendre.evaluate(y, &mut scratch.y);
         for (out, &(a, b)) in scratch.position.iter_mut().zip(&self.terms) {
             *out = scratch.x[a] * scratch.y[b];
         }
+    }
+
+    /// As [`direction`](Self::direction), at a unit vector.
+    pub(crate) fn direction_along(&self, direction: DVec3, out: &mut [f64]) {
+        self.zernike.evaluate_direction(direction, out);
+    }
+
+    /// The position terms at a place; beyond `limit` half widths of the region they are constant.
+    pub(crate) fn position_continued(&self, x_m: f64, y_m: f64, limit: f64, scratch: &mut Scratch) {
+        if self.terms.len() == 1 {
+            scratch.position[0] = 1.0;
+            return;
+        }
+        let (x, y) = self.region.scaled(&Ray { x_m, y_m, theta_rad: 0.0, phi_rad: 0.0 });
+        self.position_at((x.clamp(-limit, limit), y.clamp(-limit, limit)), scratch);
+    }
+
+    /// The largest value of a function within region and hemisphere.
+    pub(crate) fn largest(&self, k: usize) -> f64 {
+        let (n, m) = ansi_order(k % self.angular_len());
+        let both_signs = if m == 0 { 1.0 } else { 2.0 };
+        (both_signs * (n as f64 + 1.0) / PI).sqrt()
     }
 
     /// All functions along a ray.

@@ -11,6 +11,8 @@ pub enum FitError {
     Empty,
     /// The region's ends are not finite or out of order, or its cone exceeds the hemisphere.
     Region,
+    /// The sample's outline has ends that are not finite or not in order, or no area.
+    Outline,
     /// The basis has more functions than a dense fit may hold. Ask for lower degrees.
     TooLarge {
         /// Coefficients of the basis asked for.
@@ -104,6 +106,9 @@ impl fmt::Display for FitError {
             Self::Empty => f.write_str("no samples: there is nothing to fit"),
             Self::Region => f.write_str(
                 "region: ends must be finite and in order, theta_max above 0° and at most 90°",
+            ),
+            Self::Outline => f.write_str(
+                "outline of the sample: ends must be finite and in order, a radius above 0",
             ),
             Self::TooLarge { coefficients, coefficients_max } => {
                 write!(f, "{coefficients} coefficients are more than {coefficients_max}")

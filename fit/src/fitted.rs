@@ -3,7 +3,9 @@
 //! independent variance |Sᵀf|² and the shift f·δ by each common component, whose squares add.
 
 use crate::basis::{Basis, dot};
-use crate::{BasisSpec, FitError, Ray, Region};
+use crate::beam::Optics;
+use crate::beam::design::readings;
+use crate::{BasisSpec, BeamRows, FitError, Ray, Region};
 use radiometry::DomainError;
 use std::f64::consts::FRAC_PI_2;
 
@@ -73,6 +75,8 @@ pub struct Quality {
     /// deviations (or the noise was unknown). It is part of the weights and of every u, taken as
     /// independent from reading to reading.
     pub excess_rms: f64,
+    /// How the rows stand for the detector's beam; `None` where none was known.
+    pub beam: Option<BeamRows>,
 }
 
 /// The fitted field L(x, y, θ, φ), with its covariance.
@@ -111,6 +115,12 @@ impl Fit {
     /// The radiance along a ray without its uncertainty: for maps and comparisons of many rays.
     pub fn value(&self, ray: &Ray) -> f64 {
         self.basis.value(&self.parts.coefficients, ray, &mut self.basis.scratch())
+    }
+
+    /// What readings along these rays would be, each the mean over its beam: for the level of their
+    /// noise. To about a part in a thousand, and at an outline in a hundred.
+    pub fn readings(&self, rays: &[Ray], optics: &Optics) -> Result<Vec<f64>, FitError> {
+        readings(rays, &self.basis, &self.parts.coefficients, optics)
     }
 
     /// The exitance M = ∫ L cos θ dω over the whole hemisphere, mean over the region, in the
@@ -224,6 +234,11 @@ impl Fit {
     /// See [`Quality::excess_rms`].
     pub fn excess_rms(&self) -> f64 {
         self.parts.quality.excess_rms
+    }
+
+    /// See [`Quality::beam`].
+    pub fn beam(&self) -> Option<BeamRows> {
+        self.parts.quality.beam
     }
 
     pub(crate) fn functions(&self) -> &Basis {

@@ -11,7 +11,8 @@
 //! share ([`Common`]: a responsivity, a dark level, an axis zero) makes none; it is carried through
 //! the fit with its correlations and kept apart in every result ([`Estimate::u_independent`]).
 //!
-//! A reading stands for the radiance along one ray: the beam's width is not averaged over. In
+//! A reading stands for the mean of the field over the detector's beam, zero off the sample
+//! ([`fit_seen`]), or where no beam is known for the radiance along one ray ([`fit`](fn@fit)). In
 //! directions that were not measured the polynomials extrapolate, and u grows as it must.
 //!
 //! ```
@@ -41,15 +42,18 @@
 //! ```
 
 pub use basis::BasisSpec;
+pub use beam::design::BeamRows;
+pub use beam::{Optics, Outline};
 pub use error::FitError;
 pub use fitted::{CommonShift, Contribution, Estimate, Fit, Parts, Quality};
 pub use peak::Peak;
 pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
-pub use solve::fit;
+pub use solve::{fit, fit_seen};
 pub use undetermined::Cause;
 
 mod basis;
+mod beam;
 mod check;
 mod error;
 mod fitted;

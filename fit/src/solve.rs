@@ -4,6 +4,8 @@
 //! by a vector; the same factorisation carries it to the coefficients as a further right-hand side.
 
 use crate::basis::Basis;
+use crate::beam::Optics;
+use crate::beam::design::Design;
 use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::triangle::{Solution, Triangle};
@@ -21,19 +23,60 @@ pub fn fit(
     basis: BasisSpec,
     common: &[Common],
 ) -> Result<Fit, FitError> {
+    fit_seen(samples, region, basis, common, None)
+}
+
+/// As [`fit`], each sample being the mean of the field over a beam along its ray, zero off the
+/// sample: the field that comes out is the one that the beam blurred. Without optics a sample is
+/// the radiance along its ray alone.
+///
+/// Each row is the basis averaged over the beam, by as few rays as a bound allows
+/// ([`Quality::beam`] counts them). What a footprint wider than the features of the field blurs
+/// away comes back with the noise that its size calls for, and u says so.
+///
+/// ```
+/// use fit::{BasisSpec, Noise, Optics, Outline, Ray, Region, Sample};
+/// use radiometry::beam::Beam;
+///
+/// // A small Lambertian disk of 100 W·m⁻²·sr⁻¹: of a beam at 80° it fills less than half.
+/// let beam = Beam::of_spot(0.00625, 0.0025, 0.3)?;
+/// let outline = Some(Outline::Disk { centre_m: (0.0, 0.0), radius_m: 0.005 });
+/// let ray = |theta_deg: f64| {
+///     Ray { x_m: 0.0, y_m: 0.0, theta_rad: theta_deg.to_radians(), phi_rad: 0.0 }
+/// };
+/// let noise = Noise::Fixed { variance: 0.01 };
+/// // What such a beam reads, by counting rays.
+/// let read = [(0.0, 100.0), (80.0, 41.68)];
+/// let samples: Vec<Sample> =
+///     read.iter().map(|(t, value)| Sample { ray: ray(*t), value: *value, noise }).collect();
+/// let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 1.4 };
+/// let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+/// let field = fit::fit_seen(&samples, &region, basis, &[], Some(&Optics { beam, outline }))?;
+/// assert!((field.value(&ray(80.0)) - 100.0).abs() < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn fit_seen(
+    samples: &[Sample],
+    region: &Region,
+    basis: BasisSpec,
+    common: &[Common],
+    optics: Option<&Optics>,
+) -> Result<Fit, FitError> {
     check(samples, region, basis, common)?;
     let basis = Basis::new(basis, *region);
     if let Some(refusal) = undetermined::by_count(samples, &basis) {
         return Err(refusal);
     }
-    let settled = settle(samples, &basis, samples.len() - basis.len())?;
+    let design = Design::new(samples, &basis, optics)?;
+    let settled = settle(&design, samples.len() - basis.len())?;
+    let needs_a_side = |common: &Common| needs_a_side(common, &design);
     let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c)).collect();
-    let sides = sensitivities(samples, &basis, &settled, &shifting)?;
-    let solution = solve(samples, &basis, &settled.variances, &sides)?;
+    let sides = sensitivities(&design, &settled, &shifting)?;
+    let solution = solve(&design, &settled.variances, &sides)?;
     let coefficients = solution.unknowns(0);
-    let shifts = shifts(common, &coefficients, &basis, &solution);
-    let levels = levels(samples, &basis, &coefficients);
-    let quality = quality(samples, &levels, &solution, settled.excess)?;
+    let shifts = shifts(common, &coefficients, &design, &solution);
+    let levels = levels(&design, &coefficients);
+    let quality = quality(&design, &levels, &solution, settled.excess)?;
     Fit::from_parts(Parts {
         region: *region,
         basis: basis.spec(),
@@ -45,26 +88,25 @@ pub fn fit(
     .map_err(|_| FitError::OutOfRange)
 }
 
-/// The field's values along the samples' rays.
-pub(crate) fn levels(samples: &[Sample], basis: &Basis, coefficients: &[f64]) -> Vec<f64> {
-    let mut scratch = basis.scratch();
-    samples.iter().map(|s| basis.value(coefficients, &s.ray, &mut scratch)).collect()
+/// What the field makes of the samples' readings.
+pub(crate) fn levels(design: &Design<'_>, coefficients: &[f64]) -> Vec<f64> {
+    let mut room = design.room();
+    (0..design.samples().len()).map(|i| design.level(i, coefficients, &mut room)).collect()
 }
 
 /// One pass of all rows, each divided by its standard uncertainty. `sides` are further right-hand
 /// sides, one vector over the samples each.
 pub(crate) fn solve(
-    samples: &[Sample],
-    basis: &Basis,
+    design: &Design<'_>,
     variances: &[f64],
     sides: &[Vec<f64>],
 ) -> Result<Solution, FitError> {
-    let p = basis.len();
+    let p = design.basis().len();
     let mut triangle = Triangle::new(p, 1 + sides.len());
-    let mut scratch = basis.scratch();
+    let mut room = design.room();
     let mut row = vec![0.0; p + 1 + sides.len()];
-    for (i, (sample, variance)) in samples.iter().zip(variances).enumerate() {
-        basis.row(&sample.ray, &mut scratch, &mut row[..p]);
+    for (i, (sample, variance)) in design.samples().iter().zip(variances).enumerate() {
+        design.row(i, &mut room, &mut row[..p]);
         row[p] = sample.value;
         for (out, side) in row[p + 1..].iter_mut().zip(sides) {
             *out = side[i];
@@ -82,27 +124,32 @@ pub(crate) fn solve(
 }
 
 /// Whether a component's effect has to go through the factorisation. A scale and an offset don't:
-/// the fit is linear and holds the constant, so that their effect on the coefficients is known.
-fn needs_a_side(common: &Common) -> bool {
-    matches!(common.shift, Shift::Ray(_) | Shift::Value(_))
+/// the fit is linear and holds the constant, so that their effect on the coefficients is known;
+/// only that an offset of beams that are cut is no constant field.
+fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
+    match common.shift {
+        Shift::Scale => false,
+        Shift::Offset => !design.holds_constant(),
+        Shift::Ray(_) | Shift::Value(_) => true,
+    }
 }
 
 /// The change of every value by one u of each component.
 fn sensitivities(
-    samples: &[Sample],
-    basis: &Basis,
+    design: &Design<'_>,
     settled: &Settled,
     common: &[&Common],
 ) -> Result<Vec<Vec<f64>>, FitError> {
+    let samples = design.samples();
     let Settled { coefficients, levels, .. } = settled;
-    let mut scratch = basis.scratch();
+    let mut room = design.room();
     let mut change = |common: &Common, i: usize| match &common.shift {
         Shift::Scale => common.u * levels[i],
         Shift::Offset => common.u,
         Shift::Value(excess) => excess(i, levels[i]),
         Shift::Ray(seen) => {
             let seen = seen(i, &samples[i].ray);
-            basis.value(coefficients, &seen, &mut scratch) - levels[i]
+            design.change(i, &seen, coefficients, &mut room)
         }
     };
     let mut sides = Vec::with_capacity(common.len());
@@ -120,14 +167,16 @@ fn sensitivities(
 fn shifts(
     common: &[Common],
     coefficients: &[f64],
-    basis: &Basis,
+    design: &Design<'_>,
     solution: &Solution,
 ) -> Vec<CommonShift> {
     let mut side = 0;
     let mut shift = |c: &Common| match c.shift {
         Shift::Scale => coefficients.iter().map(|value| c.u * value).collect(),
-        Shift::Offset => basis.unity().iter().map(|value| c.u * value).collect(),
-        Shift::Ray(_) | Shift::Value(_) => {
+        Shift::Offset if design.holds_constant() => {
+            design.basis().unity().iter().map(|value| c.u * value).collect()
+        }
+        Shift::Offset | Shift::Ray(_) | Shift::Value(_) => {
             side += 1;
             solution.unknowns(side)
         }
@@ -136,11 +185,12 @@ fn shifts(
 }
 
 fn quality(
-    samples: &[Sample],
+    design: &Design<'_>,
     levels: &[f64],
     solution: &Solution,
     excess: f64,
 ) -> Result<Quality, FitError> {
+    let samples = design.samples();
     let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     let model = Model::of(samples);
     let n = samples.len() as f64;
@@ -158,5 +208,6 @@ fn quality(
         residual_rms: (squares / n).sqrt(),
         chi2,
         excess_rms: excess.sqrt(),
+        beam: design.rows(),
     })
 }

@@ -8,7 +8,7 @@
 //! jitter, the source drifts) an excess variance, alike for all samples, is added so that the
 //! residuals are as large as they should be (Paule & Mandel 1982, J. Res. NBS 87, 377).
 
-use crate::basis::Basis;
+use crate::beam::design::Design;
 use crate::solve::{levels, solve};
 use crate::{FitError, Noise, Sample, undetermined};
 
@@ -25,11 +25,12 @@ pub(crate) struct Settled {
 }
 
 /// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes.
-pub(crate) fn settle(samples: &[Sample], basis: &Basis, dof: usize) -> Result<Settled, FitError> {
+pub(crate) fn settle(design: &Design<'_>, dof: usize) -> Result<Settled, FitError> {
+    let (samples, basis) = (design.samples(), design.basis());
     let model = Model::of(samples);
     let mut settled = start(samples, model);
     for pass in 0..PASSES_MAX {
-        let solution = solve(samples, basis, &settled.variances, &[])?;
+        let solution = solve(design, &settled.variances, &[])?;
         if pass == 0 {
             let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
             if spectrum.rank() < basis.len() {
@@ -37,7 +38,7 @@ pub(crate) fn settle(samples: &[Sample], basis: &Basis, dof: usize) -> Result<Se
             }
         }
         settled.coefficients = solution.unknowns(0);
-        settled.levels = levels(samples, basis, &settled.coefficients);
+        settled.levels = levels(design, &settled.coefficients);
         settled.excess = excess(samples, &settled.levels, model, dof);
         let next = model.variances(samples, &settled.levels, settled.excess);
         let change = next.iter().zip(&settled.variances).map(|(a, b)| (a / b - 1.0).abs());
@@ -88,6 +89,15 @@ impl Model {
         }
     }
 
+    /// The standard uncertainty of a sample before anything is fitted, for what needs no more than
+    /// its size. Where nothing is stated: a part in a thousand of what the samples are like.
+    pub(crate) fn u_of(self, sample: &Sample) -> f64 {
+        match sample.noise {
+            Noise::Unknown => UNSTATED_RELATIVE * self.mean_square.sqrt(),
+            noise => self.variance(noise, sample.value).sqrt(),
+        }
+    }
+
     fn variances(self, samples: &[Sample], levels: &[f64], excess: f64) -> Vec<f64> {
         samples.iter().zip(levels).map(|(s, l)| self.variance(s.noise, *l) + excess).collect()
     }
@@ -123,6 +133,8 @@ fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: usize) -> f64 {
     tau2
 }
 
+/// What a sample's uncertainty is taken for where only its size matters.
+const UNSTATED_RELATIVE: f64 = 1e-3;
 /// More passes than a fit with weights that settle needs (2 to 4).
 const PASSES_MAX: usize = 8;
 /// Weights are settled when no variance changes by more: the fit is stationary against its

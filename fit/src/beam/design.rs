@@ -1,0 +1,330 @@
+//! The rows of a fit: for each sample the point rule where that is enough, a rule over the beam
+//! where it is not, as fine as is needed and no finer.
+//!
+//! Errors eᵢ of fitted readings of standard uncertainty uᵢ shift no derived quantity by more than
+//! √Σ(eᵢ/uᵢ)² of its own independent u, however they conspire. So a row may err by a tenth of
+//! uᵢ/√n. For beams that nothing cuts a bound says what a rule may err by for any field of the basis
+//! as large as the largest sample ([`super::bound`]). For beams that the outline or the horizon cuts
+//! two rules are compared, each function of the basis at that size: an estimate. The finest rule is
+//! taken where none is fine enough; [`BeamRows::quadrature`] says what that may amount to.
+
+use radiometry::quadrature::Sum;
+
+use super::{Averager, Cover, Means, Optics};
+use crate::basis::{Basis, Scratch, dot};
+use crate::weights::Model;
+use crate::{FitError, Ray, Sample};
+
+/// How the rows of a fit stand for the beam.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BeamRows {
+    /// Rows taken along the axis alone, since the beam's width doesn't show.
+    pub point: usize,
+    /// Rows averaged over a beam that the sample fills.
+    pub averaged: usize,
+    /// Rows averaged over a beam that the sample's outline cuts, or the horizon, or the end of the
+    /// position polynomials.
+    pub cut: usize,
+    /// Rows of beams that miss the sample: zero.
+    pub off_sample: usize,
+    /// Directions that the averaged and cut rows took.
+    pub directions: u64,
+    /// By how much of its own independent u the quadrature may shift a derived quantity.
+    pub quadrature: f64,
+}
+
+/// How one row is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Point,
+    Smooth(usize),
+    Across(usize),
+    Off,
+}
+
+/// The rows of samples in a basis.
+#[derive(Debug)]
+pub(crate) struct Design<'s> {
+    samples: &'s [Sample],
+    basis: &'s Basis,
+    beam: Option<Averaged>,
+}
+
+#[derive(Debug)]
+struct Averaged {
+    averager: Averager,
+    kinds: Vec<Kind>,
+    /// The rows that are no point's, one after the other, and where each begins; empty where that
+    /// would be too much to keep.
+    kept: Vec<f64>,
+    places: Vec<usize>,
+    rows: BeamRows,
+}
+
+/// Room for evaluations.
+#[derive(Debug)]
+pub(crate) struct Room {
+    pub(crate) scratch: Scratch,
+    means: Means,
+    row: Vec<f64>,
+}
+
+impl<'s> Design<'s> {
+    /// Chooses, and averages.
+    pub(crate) fn new(
+        samples: &'s [Sample],
+        basis: &'s Basis,
+        optics: Option<&Optics>,
+    ) -> Result<Self, FitError> {
+        let beam = optics.map(|optics| Averaged::new(samples, basis, optics)).transpose()?;
+        Ok(Self { samples, basis, beam })
+    }
+
+    pub(crate) fn samples(&self) -> &'s [Sample] {
+        self.samples
+    }
+
+    pub(crate) fn basis(&self) -> &'s Basis {
+        self.basis
+    }
+
+    /// `None` where there is no beam.
+    pub(crate) fn rows(&self) -> Option<BeamRows> {
+        self.beam.as_ref().map(|beam| beam.rows)
+    }
+
+    pub(crate) fn room(&self) -> Room {
+        let basis = self.basis;
+        Room { scratch: basis.scratch(), means: Means::new(basis), row: vec![0.0; basis.len()] }
+    }
+
+    /// The row of a sample.
+    pub(crate) fn row(&self, i: usize, room: &mut Room, out: &mut [f64]) {
+        match &self.beam {
+            Some(beam) if beam.kinds[i] != Kind::Point => {
+                if let Some(row) = beam.row(i, self.basis.len()) {
+                    out.copy_from_slice(row);
+                } else {
+                    let ray = &self.samples[i].ray;
+                    beam.averager.row(beam.kinds[i], ray, self.basis, &mut room.means, out);
+                }
+            }
+            _ => self.basis.row(&self.samples[i].ray, &mut room.scratch, out),
+        }
+    }
+
+    /// What the fit says that a sample's reading is.
+    pub(crate) fn level(&self, i: usize, coefficients: &[f64], room: &mut Room) -> f64 {
+        let is_point = self.beam.as_ref().is_none_or(|beam| beam.kinds[i] == Kind::Point);
+        if is_point {
+            return self.basis.value(coefficients, &self.samples[i].ray, &mut room.scratch);
+        }
+        let mut row = std::mem::take(&mut room.row);
+        self.row(i, room, &mut row);
+        let level = dot(&row, coefficients);
+        room.row = row;
+        level
+    }
+
+    /// By how much a sample's reading changes when another ray is seen. Over a beam that nothing
+    /// cuts the axis tells.
+    pub(crate) fn change(
+        &self,
+        i: usize,
+        seen: &Ray,
+        coefficients: &[f64],
+        room: &mut Room,
+    ) -> f64 {
+        let ray = &self.samples[i].ray;
+        let Some(Averaged { averager, kinds, .. }) =
+            self.beam.as_ref().filter(|beam| matches!(beam.kinds[i], Kind::Across(_) | Kind::Off))
+        else {
+            return self.basis.value(coefficients, seen, &mut room.scratch)
+                - self.basis.value(coefficients, ray, &mut room.scratch);
+        };
+        let kind = match kinds[i] {
+            Kind::Off => Kind::Across(0),
+            kind => kind,
+        };
+        let mut at = |ray: &Ray| {
+            averager.row(kind, ray, self.basis, &mut room.means, &mut room.row);
+            dot(&room.row, coefficients)
+        };
+        at(seen) - at(ray)
+    }
+
+    /// Whether an offset of all readings is a constant field: not where something cuts a beam.
+    pub(crate) fn holds_constant(&self) -> bool {
+        self.rows().is_none_or(|rows| rows.cut == 0 && rows.off_sample == 0)
+    }
+}
+
+impl Averager {
+    fn row(&self, kind: Kind, ray: &Ray, basis: &Basis, means: &mut Means, out: &mut [f64]) {
+        match kind {
+            Kind::Point => basis.row(ray, &mut basis.scratch(), out),
+            Kind::Smooth(rule) => self.smooth_row(&self.smooth[rule], ray, basis, means, out),
+            Kind::Across(rule) => self.across_row(&self.across[rule], ray, basis, means, out),
+            Kind::Off => out.fill(0.0),
+        }
+    }
+
+    /// The coarsest rule for a beam that nothing cuts, and what it may err by.
+    fn rule_within(&self, theta_rad: f64, allowed: f64) -> (Kind, f64) {
+        let point = self.bound.of_point(theta_rad);
+        if point <= allowed {
+            return (Kind::Point, point);
+        }
+        let mut last = (Kind::Point, point);
+        for (i, rule) in self.smooth.iter().enumerate() {
+            last = (Kind::Smooth(i), self.bound.of_rule(theta_rad, rule.degree));
+            if last.1 <= allowed {
+                break;
+            }
+        }
+        last
+    }
+}
+
+/// What a field of these coefficients makes of readings along rays: middling rules, for what needs
+/// no more than a reading's level.
+pub(crate) fn readings(
+    rays: &[Ray],
+    basis: &Basis,
+    coefficients: &[f64],
+    optics: &Optics,
+) -> Result<Vec<f64>, FitError> {
+    let averager = Averager::new(optics, basis)?;
+    let (mut means, mut row) = (Means::new(basis), vec![0.0; basis.len()]);
+    let reading = |ray: &Ray| {
+        let kind = match averager.cover(ray) {
+            Cover::Within => Kind::Smooth(1),
+            Cover::Across => Kind::Across(0),
+            Cover::Off => Kind::Off,
+        };
+        averager.row(kind, ray, basis, &mut means, &mut row);
+        dot(&row, coefficients)
+    };
+    Ok(rays.iter().map(reading).collect())
+}
+
+impl Averaged {
+    fn new(samples: &[Sample], basis: &Basis, optics: &Optics) -> Result<Self, FitError> {
+        let averager = Averager::new(optics, basis)?;
+        let model = Model::of(samples);
+        let size = samples.iter().map(|s| s.value.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let share = PART_OF_U / (samples.len() as f64).sqrt();
+        let keeps = samples.len().saturating_mul(basis.len()) <= KEPT_NUMBERS_MAX;
+        let mut new = Self {
+            averager,
+            kinds: Vec::with_capacity(samples.len()),
+            kept: Vec::new(),
+            places: Vec::new(),
+            rows: BeamRows::default(),
+        };
+        let mut choice = Choice::new(basis);
+        let mut squares = Sum::default();
+        for sample in samples {
+            // In units of the field's size.
+            let u = model.u_of(sample) / size;
+            let (kind, error) = choice.of(&new.averager, &sample.ray, share * u);
+            new.note(kind);
+            squares.add((error / u).powi(2));
+            if keeps {
+                new.places.push(new.kept.len());
+                if matches!(kind, Kind::Smooth(_) | Kind::Across(_)) {
+                    if let Kind::Smooth(_) = kind {
+                        let (means, row) = (&mut choice.means, &mut choice.row);
+                        new.averager.row(kind, &sample.ray, basis, means, row);
+                    }
+                    new.kept.extend_from_slice(&choice.row);
+                }
+            }
+        }
+        new.rows.quadrature = squares.value().sqrt();
+        Ok(new)
+    }
+
+    fn note(&mut self, kind: Kind) {
+        self.kinds.push(kind);
+        let rows = &mut self.rows;
+        let directions = match kind {
+            Kind::Point | Kind::Off => 0,
+            Kind::Smooth(rule) => self.averager.smooth[rule].nodes.len(),
+            Kind::Across(rule) => self.averager.across[rule].nodes.len(),
+        };
+        rows.directions += directions as u64;
+        *match kind {
+            Kind::Point => &mut rows.point,
+            Kind::Smooth(_) => &mut rows.averaged,
+            Kind::Across(_) => &mut rows.cut,
+            Kind::Off => &mut rows.off_sample,
+        } += 1;
+    }
+
+    /// The row of a sample, if it was kept.
+    fn row(&self, i: usize, length: usize) -> Option<&[f64]> {
+        match self.kinds[i] {
+            Kind::Smooth(_) | Kind::Across(_) => {
+                self.kept.get(*self.places.get(i)?..)?.get(..length)
+            }
+            Kind::Point | Kind::Off => None,
+        }
+    }
+}
+
+/// Chooses rules; leaves the row of a cut beam behind.
+struct Choice<'b> {
+    basis: &'b Basis,
+    means: Means,
+    row: Vec<f64>,
+    coarser: Vec<f64>,
+    /// The largest value of each function.
+    largest: Vec<f64>,
+}
+
+impl<'b> Choice<'b> {
+    fn new(basis: &'b Basis) -> Self {
+        let room = || vec![0.0; basis.len()];
+        let largest = (0..basis.len()).map(|k| basis.largest(k)).collect();
+        Self { basis, means: Means::new(basis), row: room(), coarser: room(), largest }
+    }
+
+    /// The rule for a ray, and what it errs by, as a part of the field's size.
+    fn of(&mut self, averager: &Averager, ray: &Ray, allowed: f64) -> (Kind, f64) {
+        match averager.cover(ray) {
+            Cover::Off => (Kind::Off, 0.0),
+            Cover::Within => averager.rule_within(ray.theta_rad, allowed),
+            Cover::Across => self.compared(averager, ray, allowed),
+        }
+    }
+
+    /// A finer rule differs from a coarser one by about what the coarser one errs.
+    fn compared(&mut self, averager: &Averager, ray: &Ray, allowed: f64) -> (Kind, f64) {
+        let Self { basis, means, row, coarser, largest } = self;
+        let mut last = (Kind::Across(0), f64::INFINITY);
+        averager.row(last.0, ray, basis, means, row);
+        for rule in 1..averager.across.len() {
+            std::mem::swap(row, coarser);
+            last.0 = Kind::Across(rule);
+            averager.row(last.0, ray, basis, means, row);
+            let pairs = row.iter().zip(coarser.iter()).zip(largest.iter());
+            let off = pairs.map(|((a, b), largest)| (a - b).abs() / largest).fold(0.0, f64::max);
+            // The rules' errors fall at least as fast as from one of them to the next.
+            last.1 = off * GAIN;
+            if last.1 <= allowed.max(FLOOR) {
+                break;
+            }
+        }
+        last
+    }
+}
+
+/// The shift of a derived quantity by quadrature, in its own independent u, that is aimed at.
+const PART_OF_U: f64 = 0.1;
+/// What the next rule for cut beams errs by, over its difference from the one before.
+const GAIN: f64 = 0.25;
+/// A cut row is not taken more exactly than this: no outline is known so well.
+const FLOOR: f64 = 1e-4;
+/// Rows are kept from pass to pass up to this many numbers, 256 MB.
+const KEPT_NUMBERS_MAX: usize = 1 << 25;

@@ -1,0 +1,253 @@
+//! What a reading says of the field: not the radiance along one ray but its mean over a beam,
+//! (1/T) ∫ L dT over all rays through pupil and spot, zero off the sample. A row of the design is
+//! the basis averaged so. It does not know which reading deserves which rule: that is [`design`].
+//!
+//! Beyond the region the position polynomials go on, out to twice its half width, and are constant
+//! from there: nothing was measured there, and they must not run away with a footprint that near
+//! grazing is longer than any sample. Below the horizon nothing is seen: rays from there are zero.
+
+mod bound;
+mod cut;
+pub(crate) mod design;
+mod directions;
+mod lens;
+mod outline;
+mod sight;
+
+use radiometry::beam::{Beam, footprint};
+
+use crate::basis::{Basis, Scratch};
+use crate::{FitError, Ray};
+use bound::Bound;
+use cut::{Cuts, Cutter};
+use directions::{Directions, Node};
+use sight::{Shear, Sight};
+
+pub use outline::Outline;
+
+/// What the detector sees of the sample: its beam, and where the sample ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Optics {
+    /// The beam; its origin is the reading's place on the sample.
+    pub beam: Beam,
+    /// Beyond it the radiance is zero. `None`: the field goes on over the whole footprint.
+    pub outline: Option<Outline>,
+}
+
+impl Optics {
+    /// Whether a beam along this ray may reach beyond the sample: the rectangle around its
+    /// footprint does. Never where no outline is known.
+    pub fn reaches_beyond(&self, ray: &Ray) -> bool {
+        let Some(outline) = &self.outline else { return false };
+        corners(&self.beam, ray)
+            .is_none_or(|corners| !corners.iter().all(|(x, y)| outline.holds(*x, *y)))
+    }
+}
+
+/// The corners of a rectangle around the beam's footprint, on the sample; `None` where some ray
+/// never meets its plane.
+fn corners(beam: &Beam, ray: &Ray) -> Option<[(f64, f64); 4]> {
+    let theta = ray.theta_rad.clamp(0.0, core::f64::consts::FRAC_PI_2);
+    let reach = footprint(beam, theta).ok().flatten()?;
+    let (sight, y) = (Sight::new(ray), reach.across_m);
+    let corners = [(-reach.far_m, -y), (-reach.far_m, y), (reach.near_m, -y), (reach.near_m, y)];
+    Some(corners.map(|corner| sight.place(corner)))
+}
+
+/// Where a beam's footprint lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cover {
+    /// On the sample, as far as the basis goes.
+    Within,
+    /// Across the outline, the horizon, or the end of the position polynomials.
+    Across,
+    /// Off the sample.
+    Off,
+}
+
+/// Averages a basis over beams.
+#[derive(Debug, Clone)]
+pub(crate) struct Averager {
+    optics: Optics,
+    bound: Bound,
+    /// By rising degree.
+    smooth: Vec<Directions>,
+    /// The same, for beams that something cuts.
+    across: Vec<Directions>,
+    cutter: Cutter,
+    /// Where the position polynomials end, by axis (true: x), for axes that they vary along.
+    ends: Vec<(bool, (f64, f64))>,
+}
+
+impl Averager {
+    pub(crate) fn new(optics: &Optics, basis: &Basis) -> Result<Self, FitError> {
+        if let Some(outline) = &optics.outline {
+            outline.check()?;
+        }
+        let region = basis.region();
+        let is_wide = |(from, to): (f64, f64)| to > from;
+        let is_even = !is_wide(region.x_m) && !is_wide(region.y_m);
+        let degree = if is_even { 0 } else { basis.spec().position_degree };
+        let beam = &optics.beam;
+        let smooth = SMOOTH_DEGREES.iter().map(|d| Directions::smooth(beam, *d, degree));
+        let across = ACROSS_DEGREES.iter().map(|d| Directions::kinked(beam, *d, degree));
+        let axes = [(true, region.x_m), (false, region.y_m)];
+        let ends = axes.into_iter().filter(|(_, axis)| degree > 0 && is_wide(*axis));
+        Ok(Self {
+            optics: *optics,
+            bound: Bound::new(&optics.beam, basis),
+            smooth: smooth.collect(),
+            across: across.collect(),
+            cutter: Cutter::new(degree),
+            ends: ends.map(|(is_x, axis)| (is_x, continued(axis))).collect(),
+        })
+    }
+
+    /// Where the footprint of a beam along this ray lies.
+    fn cover(&self, ray: &Ray) -> Cover {
+        corners(&self.optics.beam, ray).map_or(Cover::Across, |corners| self.cover_of(&corners))
+    }
+
+    /// Where the convex hull of places lies.
+    fn cover_of(&self, places: &[(f64, f64)]) -> Cover {
+        let is_beyond = |(is_x, (low, high)): &(bool, (f64, f64))| {
+            let at = |(x, y): &(f64, f64)| if *is_x { *x } else { *y };
+            places.iter().any(|place| at(place) < *low || at(place) > *high)
+        };
+        match &self.optics.outline {
+            Some(outline) if outline.misses(places) => Cover::Off,
+            Some(outline) if !places.iter().all(|(x, y)| outline.holds(*x, *y)) => Cover::Across,
+            _ if self.ends.iter().any(is_beyond) => Cover::Across,
+            _ => Cover::Within,
+        }
+    }
+
+    /// The basis averaged over a beam that nothing cuts.
+    fn smooth_row(
+        &self,
+        rule: &Directions,
+        ray: &Ray,
+        basis: &Basis,
+        scratch: &mut Means,
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
+        let sight = Sight::new(ray);
+        for node in &rule.nodes {
+            let Some(direction) = sight.direction(node.slope) else { continue };
+            let shear = sight.shear(&self.optics.beam, node);
+            scratch.clear();
+            self.whole(rule, node, (&sight, &shear), basis, scratch);
+            basis.direction_along(direction, &mut scratch.direction);
+            scratch.add(node.weight, out);
+        }
+    }
+
+    /// The position terms' mean over all rays of a direction.
+    fn whole(
+        &self,
+        rule: &Directions,
+        node: &Node,
+        (sight, shear): (&Sight, &Shear),
+        basis: &Basis,
+        scratch: &mut Means,
+    ) {
+        if self.ends.is_empty() {
+            scratch.add_place(1.0, basis, (0.0, 0.0));
+            return;
+        }
+        for place in &rule.rings[node.ring].places {
+            let s1 = place.along * node.cos - place.across * node.sin;
+            let s2 = place.along * node.sin + place.across * node.cos;
+            scratch.add_place(place.weight, basis, sight.place(shear.place((s1, s2))));
+        }
+    }
+
+    /// The basis averaged over a beam that something cuts.
+    fn across_row(
+        &self,
+        rule: &Directions,
+        ray: &Ray,
+        basis: &Basis,
+        scratch: &mut Means,
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
+        let (sight, beam) = (Sight::new(ray), &self.optics.beam);
+        for node in &rule.nodes {
+            let Some(direction) = sight.direction(node.slope) else { continue };
+            let shear = sight.shear(beam, node);
+            scratch.clear();
+            let ring = &rule.rings[node.ring];
+            let (low, high) = ring.lens.box_of(node.cos, node.sin);
+            let corners = [(low.0, low.1), (low.0, high.1), (high.0, low.1), (high.0, high.1)];
+            let corners = corners.map(|corner| sight.place(shear.place(corner)));
+            let is_above = beam.pupil_z_m() * sight.cos
+                > (high.0 + beam.separation_m() * node.slope.0) * sight.sin;
+            match self.cover_of(&corners) {
+                Cover::Off => continue,
+                Cover::Within if is_above => {
+                    self.whole(rule, node, (&sight, &shear), basis, scratch);
+                }
+                Cover::Within | Cover::Across => {
+                    let outline = self.optics.outline.as_ref();
+                    let cuts = Cuts::new(&sight, &shear, beam, node, outline, &self.ends);
+                    self.cutter.places(ring, node, &shear, &cuts, |place, weight| {
+                        scratch.add_place(weight, basis, sight.place(shear.place(place)));
+                    });
+                }
+            }
+            basis.direction_along(direction, &mut scratch.direction);
+            scratch.add(node.weight, out);
+        }
+    }
+}
+
+/// Scratch of one average: the position terms' mean over places, and the functions of direction.
+#[derive(Debug)]
+pub(crate) struct Means {
+    place: Scratch,
+    position: Vec<f64>,
+    direction: Vec<f64>,
+}
+
+impl Means {
+    pub(crate) fn new(basis: &Basis) -> Self {
+        Self {
+            place: basis.scratch(),
+            position: vec![0.0; basis.position_len()],
+            direction: vec![0.0; basis.angular_len()],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.position.fill(0.0);
+    }
+
+    fn add_place(&mut self, weight: f64, basis: &Basis, (x_m, y_m): (f64, f64)) {
+        basis.position_continued(x_m, y_m, CONTINUED, &mut self.place);
+        for (mean, term) in self.position.iter_mut().zip(self.place.position()) {
+            *mean += weight * term;
+        }
+    }
+
+    fn add(&self, weight: f64, out: &mut [f64]) {
+        for (mean, block) in self.position.iter().zip(out.chunks_exact_mut(self.direction.len())) {
+            let factor = weight * mean;
+            block.iter_mut().zip(&self.direction).for_each(|(out, z)| *out += factor * z);
+        }
+    }
+}
+
+/// Twice an interval about its middle.
+fn continued((from, to): (f64, f64)) -> (f64, f64) {
+    let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
+    (middle - CONTINUED * half, middle + CONTINUED * half)
+}
+
+/// The position polynomials end here, in half widths of the region from its middle.
+const CONTINUED: f64 = 2.0;
+/// Degrees in the slopes of rules for beams that nothing cuts.
+const SMOOTH_DEGREES: [usize; 6] = [3, 5, 7, 9, 13, 21];
+/// Degrees of rules for beams that something cuts: what is averaged has kinks.
+const ACROSS_DEGREES: [usize; 3] = [7, 13, 25];

@@ -1,0 +1,289 @@
+//! Readings that are means over a beam give back the field that was blurred: readings are made here
+//! by counting rays through pupil and spot, and by no rule of the fit's.
+
+#[allow(dead_code)]
+mod scenes;
+
+use fit::{BasisSpec, BeamRows, Common, Noise, Optics, Outline, Ray, Region, Sample, Shift};
+use radiometry::beam::Beam;
+use radiometry::direction::{angles, unit};
+use radiometry::quadrature::Sobol;
+use scenes::{Die, spread_rays};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Quasi-random rays of a reading: their error is a few parts in ten thousand at an edge.
+const RAYS: usize = 1 << 17;
+
+/// 12.5 mm pupil, 5 mm spot, 300 mm.
+fn stock() -> Beam {
+    Beam::of_spot(0.00625, 0.0025, 0.3).unwrap()
+}
+
+fn region(half_m: f64, theta_max_deg: f64) -> Region {
+    let side = (-half_m, half_m);
+    Region { x_m: side, y_m: side, theta_max_rad: theta_max_deg.to_radians() }
+}
+
+fn ray(x_m: f64, y_m: f64, theta_deg: f64, phi_deg: f64) -> Ray {
+    Ray { x_m, y_m, theta_rad: theta_deg.to_radians(), phi_rad: phi_deg.to_radians() }
+}
+
+/// (1/T) ∫ L dT, by so many rays between points of the pupil and of the spot: their geometry
+/// written out in the sample's frame, dT = cos cos dA dA / r².
+fn read(beam: &Beam, ray: &Ray, rays: usize, field: &dyn Fn(&Ray) -> f64) -> f64 {
+    let axis = unit(ray.theta_rad, ray.phi_rad);
+    let side = unit(FRAC_PI_2, ray.phi_rad + FRAC_PI_2);
+    let down = side.cross(axis);
+    let h = beam.separation_m();
+    let centre = scenes_place(ray);
+    let mut sobol = Sobol::<4>::new().unwrap();
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for _ in 0..rays {
+        let t = sobol.next_point().map(|bits| (f64::from(bits) + 0.5) * 2f64.powi(-32));
+        let on_disk = |square: f64, turn: f64| {
+            let (sin, cos) = (TAU * turn).sin_cos();
+            (down * cos + side * sin) * square.sqrt()
+        };
+        let spot = centre + on_disk(t[0], t[1]) * beam.stop_radius_m();
+        let pupil = centre + axis * h + on_disk(t[2], t[3]) * beam.pupil_radius_m();
+        let between = pupil - spot;
+        let weight = (h / between.length_squared()).powi(2);
+        whole += weight;
+        if pupil.z <= 0.0 || between.z <= 0.0 {
+            continue;
+        }
+        let place = spot - between * (spot.z / between.z);
+        let (theta_rad, phi_rad) = angles(between);
+        sum += weight * field(&Ray { x_m: place.x, y_m: place.y, theta_rad, phi_rad });
+    }
+    sum / whole
+}
+
+fn scenes_place(ray: &Ray) -> glam::DVec3 {
+    glam::DVec3::new(ray.x_m, ray.y_m, 0.0)
+}
+
+const NOISE: Noise = Noise::Fixed { variance: 1e-4 };
+
+fn samples(rays: &[Ray], value: impl Fn(&Ray) -> f64) -> Vec<Sample> {
+    rays.iter().map(|ray| Sample { ray: *ray, value: value(ray), noise: NOISE }).collect()
+}
+
+fn rows(fit: &fit::Fit) -> BeamRows {
+    fit.beam().expect("a beam was handed in")
+}
+
+/// A lobe and a gradient, in the span of degrees 6 and 1, 40 mm wide.
+fn lobe(ray: &Ray) -> f64 {
+    let (u, cos) = (ray.theta_rad.sin() * ray.phi_rad.cos(), ray.theta_rad.cos());
+    10.0 * cos.powi(6) + 2.0 * u + 3.0 + 40.0 * ray.x_m * (1.0 + u) - 25.0 * ray.y_m
+}
+
+#[test]
+fn a_blurred_field_comes_back_and_the_axis_alone_is_biased() {
+    let region = region(0.04, 75.0);
+    // A wide beam: ±5°, 20 mm of spot.
+    let beam = Beam::of_spot(0.02, 0.01, 0.3).unwrap();
+    let basis = BasisSpec { angular_degree: 6, position_degree: 1 };
+    let rays = spread_rays(260, &region, 11);
+    let read = samples(&rays, |ray| read(&beam, ray, 1 << 13, &lobe));
+    let optics = Optics { beam, outline: None };
+    let averaged = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+    let point = fit::fit(&read, &region, basis, &[]).unwrap();
+    let worst = |fit: &fit::Fit| {
+        let rays = spread_rays(200, &region, 12);
+        rays.iter().map(|ray| (fit.value(ray) - lobe(ray)).abs()).fold(0.0, f64::max)
+    };
+    assert!(worst(&averaged) < 0.01, "{} with the beam", worst(&averaged));
+    assert!(worst(&point) > 0.05, "{} without", worst(&point));
+    assert_eq!(point.beam(), None);
+    let rows = rows(&averaged);
+    assert_eq!((rows.point, rows.off_sample, rows.point + rows.averaged + rows.cut), (0, 0, 260));
+    assert!(rows.quadrature < 0.2, "{rows:?}");
+}
+
+#[test]
+fn a_field_whose_readings_run_over_the_outline_comes_back_within_its_u() {
+    // An emitter of 9 mm radius, measured to 80° over its inner part, with noise.
+    let region = region(0.004, 80.0);
+    let outline = Outline::Disk { centre_m: (0.0005, -0.0003), radius_m: 0.009 };
+    let field = |ray: &Ray| {
+        let is_on = (ray.x_m - 0.0005).hypot(ray.y_m + 0.0003) <= 0.009;
+        if is_on { 20.0 + 30.0 * ray.theta_rad.cos().powi(4) } else { 0.0 }
+    };
+    let basis = BasisSpec { angular_degree: 4, position_degree: 0 };
+    let rays = spread_rays(300, &region, 21);
+    let mut die = Die::new(22);
+    let mut read = samples(&rays, |ray| read(&stock(), ray, 1 << 13, &field));
+    for sample in &mut read {
+        sample.value += 0.01 * die.normal();
+    }
+    let optics = Optics { beam: stock(), outline: Some(outline) };
+    let averaged = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+    let blind =
+        fit::fit_seen(&read, &region, basis, &[], Some(&Optics { outline: None, ..optics }));
+    let exitance = PI * (20.0 + 30.0 * 2.0 / 6.0);
+    let off = |fit: &fit::Fit| fit.exitance().value / exitance - 1.0;
+    assert!(off(&averaged).abs() < 2e-3, "{:e} with the outline", off(&averaged));
+    let blind = off(&blind.unwrap());
+    assert!(blind.abs() > 0.01, "{blind:e} without");
+    assert!(rows(&averaged).cut > 50, "{:?}", rows(&averaged));
+}
+
+#[test]
+fn cut_rows_are_the_shares_of_rays_that_leave_the_sample() {
+    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let square = Outline::Rectangle { x_m: (-0.02, 0.02), y_m: (-0.015, 0.02) };
+    let disk = Outline::Disk { centre_m: (0.003, 0.0), radius_m: 0.02 };
+    let places =
+        [ray(0.0, 0.0, 85.0, 0.0), ray(0.019, 0.0, 40.0, 0.0), ray(0.018, 0.018, 70.0, 33.0)];
+    let more =
+        [ray(-0.017, 0.0, 0.0, 0.0), ray(0.0, 0.016, 80.0, -90.0), ray(0.0, 0.0, 88.0, 45.0)];
+    for at in places.iter().chain(&more) {
+        for outline in [square, disk] {
+            let on = |ray: &Ray| f64::from(outline.holds(ray.x_m, ray.y_m));
+            let share = read(&stock(), at, RAYS, &on);
+            // One reading, one unknown: what a field of 1 is fitted as, is one over the row.
+            let one = Sample { ray: *at, value: 1.0, noise: NOISE };
+            let optics = Optics { beam: stock(), outline: Some(outline) };
+            let region = region(0.021, 90.0);
+            let fit = fit::fit_seen(&[one], &region, basis, &[], Some(&optics)).unwrap();
+            let found = 1.0 / fit.value(at);
+            let close = if at.theta_rad > 1.5 { 2e-3 } else { 3e-4 };
+            assert!((found - share).abs() < close, "{found} of {share} at {at:?} on {outline:?}");
+        }
+    }
+}
+
+#[test]
+fn rays_from_below_the_horizon_see_nothing() {
+    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let optics = Optics { beam: stock(), outline: None };
+    let region = region(0.02, 90.0);
+    for (theta_deg, low, high) in
+        [(90.0, 0.4, 0.5), (89.0, 0.9, 0.999), (87.0, 1.0 - 1e-9, 1.0 + 1e-9)]
+    {
+        let at = ray(0.0, 0.0, theta_deg, 20.0);
+        let one = Sample { ray: at, value: 1.0, noise: NOISE };
+        let fit = fit::fit_seen(&[one], &region, basis, &[], Some(&optics)).unwrap();
+        let found = 1.0 / fit.value(&at);
+        assert!(found > low && found < high, "{found} at {theta_deg}°");
+        let share = read(&stock(), &at, RAYS, &|_| 1.0);
+        // Every second ray is near the plane: the rules see the half that rises coarsely.
+        let close = if theta_deg > 88.5 { 0.02 } else { 2e-3 };
+        assert!((found - share).abs() < close, "{found} of {share} at {theta_deg}°");
+    }
+}
+
+#[test]
+fn a_shrinking_beam_ends_in_the_point() {
+    let region = region(0.02, 75.0);
+    let basis = BasisSpec { angular_degree: 6, position_degree: 1 };
+    let rays = spread_rays(200, &region, 31);
+    let read = samples(&rays, lobe);
+    let point = fit::fit(&read, &region, basis, &[]).unwrap();
+    let mut last = f64::INFINITY;
+    for shrink in [1.0, 1e-1, 1e-2, 1e-4] {
+        let beam = Beam::of_spot(0.006 * shrink, 0.0025 * shrink, 0.3).unwrap();
+        let optics = Optics { beam, outline: None };
+        let fit = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+        let pairs = fit.coefficients().iter().zip(point.coefficients());
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < last || off == 0.0, "{off:e} after {last:e} at {shrink}");
+        last = off;
+        if shrink < 1e-3 {
+            assert_eq!(rows(&fit).point, 200, "the point rule is enough for a thread");
+        }
+    }
+    assert!(last < 1e-9, "{last:e}");
+}
+
+#[test]
+fn the_quadrature_holds_what_it_says() {
+    // Exact readings: what remains of a fit that errs within its bound is a part of its u.
+    let region = region(0.03, 70.0);
+    let field = |ray: &Ray| {
+        let (u, v) =
+            (ray.theta_rad.sin() * ray.phi_rad.cos(), ray.theta_rad.sin() * ray.phi_rad.sin());
+        5.0 + 20.0 * u.powi(5) * v - 10.0 * v.powi(6)
+            + 100.0 * ray.x_m * v
+            + 2e3 * ray.x_m * ray.y_m
+    };
+    let basis = BasisSpec { angular_degree: 6, position_degree: 2 };
+    let rays = spread_rays(400, &region, 41);
+    // Two fine rules of another make, so that their own error is known to be small.
+    let rule = stock().rule(9);
+    let mean = |ray: &Ray| {
+        let placed =
+            radiometry::beam::Placed::new(scenes_place(ray), unit(ray.theta_rad, ray.phi_rad));
+        rule.mean(|of| {
+            let (point, along) = (placed.point(of.point), placed.direction(of.direction));
+            let place = point - along * (point.z / along.z);
+            let (theta_rad, phi_rad) = angles(along);
+            field(&Ray { x_m: place.x, y_m: place.y, theta_rad, phi_rad })
+        })
+    };
+    let read = samples(&rays, mean);
+    let optics = Optics { beam: stock(), outline: None };
+    for variance in [1e-2, 1e-4, 1e-6, 1e-8] {
+        let noise = Noise::Fixed { variance };
+        let read: Vec<Sample> = read.iter().map(|sample| Sample { noise, ..*sample }).collect();
+        let fit = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+        let rows = rows(&fit);
+        assert!(rows.quadrature < 0.2, "{rows:?}");
+        for at in spread_rays(100, &region, 42) {
+            let found = fit.radiance(&at);
+            let off = (found.value - field(&at)).abs() / found.u_independent;
+            assert!(off <= rows.quadrature + 1e-6, "{off} u, said {rows:?}");
+        }
+    }
+}
+
+#[test]
+fn a_constant_is_a_constant_inside_whatever_the_rule() {
+    let region = region(0.02, 80.0);
+    let basis = BasisSpec { angular_degree: 5, position_degree: 2 };
+    let read = samples(&spread_rays(300, &region, 51), |_| 7.0);
+    let optics = Optics { beam: stock(), outline: None };
+    let fit = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+    for at in spread_rays(50, &region, 52) {
+        assert!((fit.value(&at) - 7.0).abs() < 1e-5, "{} at {at:?}", fit.value(&at));
+    }
+    assert!(fit.residual_rms() < 1e-5);
+}
+
+#[test]
+fn an_offset_of_cut_readings_is_no_constant_field() {
+    let region = region(0.004, 80.0);
+    let outline = Some(Outline::Disk { centre_m: (0.0, 0.0), radius_m: 0.006 });
+    let optics = Optics { beam: stock(), outline };
+    let rays = spread_rays(60, &region, 61);
+    let on = |ray: &Ray| f64::from(ray.x_m.hypot(ray.y_m) <= 0.006);
+    let read = samples(&rays, |ray| read(&stock(), ray, 1 << 13, &on));
+    let basis = BasisSpec { angular_degree: 1, position_degree: 0 };
+    let offset = |u: f64| {
+        let shifted: Vec<Sample> =
+            read.iter().map(|s| Sample { value: s.value + u, ..*s }).collect();
+        let dark = Common { name: "dark".into(), u: 1e-3, shift: Shift::Offset };
+        fit::fit_seen(&shifted, &region, basis, &[dark], Some(&optics)).unwrap()
+    };
+    let (without, with) = (offset(0.0), offset(1e-3));
+    let change = with.exitance().value - without.exitance().value;
+    let stated = without.contributions()[1].u;
+    assert!((change / stated - 1.0).abs() < 1e-6, "{change} beside {stated}");
+    assert!(change > 1.02 * PI * 1e-3);
+}
+
+#[test]
+fn an_outline_without_area_is_refused() {
+    let region = region(0.004, 80.0);
+    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let read = samples(&spread_rays(4, &region, 71), |_| 1.0);
+    let nan = Outline::Disk { centre_m: (0.0, f64::NAN), radius_m: 1.0 };
+    let flat = Outline::Rectangle { x_m: (0.0, 1.0), y_m: (1.0, 1.0) };
+    for outline in [nan, flat] {
+        let optics = Optics { beam: stock(), outline: Some(outline) };
+        let refusal = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap_err();
+        assert_eq!(refusal, fit::FitError::Outline);
+    }
+}
