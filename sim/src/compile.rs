@@ -16,6 +16,7 @@ use crate::check::check;
 use crate::detector::{self, Amplifier, ELEMENTARY_CHARGE_C};
 use crate::effect::{Chosen, EffectRow, decide};
 use crate::field::{Field, Ray};
+use crate::light;
 use crate::mechanics::{self, AxisTruth, Kinematics, Moment};
 use crate::optics::{Axis, FINITE_BEAM, Light, Optics, PointSampled};
 use crate::stage::Stages;
@@ -68,6 +69,8 @@ pub enum CompileError {
     },
     /// A number of the rig that no rig has: name, value.
     Nominal(String, f64),
+    /// What the scene says makes no sense together.
+    Scene(String),
     /// The scene's levels are in another quantity than the detector is calibrated for.
     Quantity {
         /// The scene's.
@@ -124,21 +127,21 @@ pub fn compile(
         return Err(CompileError::Quantity { scene, rig });
     }
     check(&nominal, &simulated, terms)?;
-    if let Some(what) = scene.beyond_flat_emitters() {
-        return Err(CompileError::Unsupported(what));
-    }
     let scene = Arc::new(scene);
-    let setting = Setting::new(&scene, &nominal, &simulated, terms)?;
+    let mut setting = Setting::new(&scene, &nominal, &simulated, terms)?;
     let tolerance = setting.tolerance;
-    let mut light = Light::of(&setting).map_err(CompileError::Beam)?;
-    let mut candidates = core::mem::take(&mut light.candidates);
+    let mut beam = Light::of(&setting).map_err(CompileError::Beam)?;
+    let mut candidates = core::mem::take(&mut beam.candidates);
+    candidates.extend(light::candidates(&setting)?);
     candidates.extend(mechanics::candidates(&setting));
     candidates.extend(time::candidates(&setting));
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
-    let (region, optics) = (setting.region, light.optics(&setting, &chosen));
-    let field = Arc::clone(&setting.field);
     let departing = detector::departing(&nominal.detector, &chosen);
+    let is_in = |name: &str| chosen.has(name);
+    setting.field = light::field(&scene, Some(nominal.detector.distance_m), &is_in)?;
+    let (region, optics) = (setting.region, beam.optics(&setting, &chosen));
+    let (seen, field) = (Arc::clone(&setting.field), light::field(&scene, None, &is_in)?);
     let (responsivity, throughput) = draw_optics(&departing, terms.seed)?;
     Ok(Compiled {
         current_per_radiance: responsivity * throughput,
@@ -151,6 +154,7 @@ pub fn compile(
         nominal,
         simulated,
         seed: terms.seed,
+        seen,
         field,
         optics,
         chosen,
@@ -174,7 +178,7 @@ impl<'s> Setting<'s> {
             coaxial_disks(detector.pupil_radius_m, detector.spot_radius_m, detector.distance_m)
                 .map_err(|_| CompileError::Drawn("throughput", detector.distance_m))?;
         let region = terms.region.unwrap_or_else(|| scene.bounding_region());
-        let field: Arc<dyn Field> = Arc::clone(scene) as _;
+        let field = light::field(scene, Some(detector.distance_m), &|_| true)?;
         let mut setting = Self {
             scene,
             nominal,
@@ -245,8 +249,15 @@ impl Compiled {
         less.axes = mechanics::axes(&self.nominal, &self.simulated, self.seed, &less.chosen);
         less.moments = mechanics::moments(&self.nominal, &self.simulated, &less.chosen);
         less.kinematics = mechanics::kinematics(&self.simulated, self.seed, &less.chosen);
+        if !self.scene.is_flat_emitters() {
+            let is_in = |name: &str| less.chosen.has(name);
+            let distance_m = Some(self.nominal.detector.distance_m);
+            less.seen = light::field(&self.scene, distance_m, &is_in).ok()?;
+            less.field = light::field(&self.scene, None, &is_in).ok()?;
+            less.optics = self.optics.looking_at(Arc::clone(&less.seen));
+        }
         if !less.chosen.has(FINITE_BEAM) {
-            less.optics = Arc::new(PointSampled(Arc::clone(&self.field)));
+            less.optics = Arc::new(PointSampled(Arc::clone(&less.seen)));
         }
         Some(less)
     }
@@ -279,7 +290,7 @@ impl Compiled {
 
     /// What leaves the sample, over a region.
     pub fn truth(&self, region: Region) -> Truth<'_> {
-        Truth::new(&self.scene, region)
+        Truth::new(&self.scene, &*self.field, region)
     }
 
     /// ADC readings a second.
@@ -363,6 +374,7 @@ impl fmt::Display for CompileError {
                 scene.name(),
                 rig.name()
             ),
+            Self::Scene(what) => f.write_str(what),
             Self::Terms(name, value) => write!(f, "{name}: {value} is not what a plan has"),
             Self::UnknownEffect { name, nearest, known } => {
                 write!(f, "no effect is called {name}")?;
@@ -371,7 +383,7 @@ impl fmt::Display for CompileError {
                 }
                 write!(f, " The effects here: {}", known.join(", "))
             }
-            Self::Unsupported(what) => write!(f, "not supported yet: {what}"),
+            Self::Unsupported(what) => write!(f, "not simulated: {what}"),
         }
     }
 }

@@ -65,6 +65,11 @@ pub(crate) trait Field: fmt::Debug + Send + Sync {
         None
     }
 
+    /// Whether what leaves each place goes alike into all directions, and all places lie in the plane.
+    fn is_even(&self) -> bool {
+        false
+    }
+
     /// The largest radiance of a region; no less than that of any landmark.
     fn brightest(&self, region: &Region) -> f64 {
         self.landmarks(region).iter().map(|ray| self.radiance(ray)).fold(0.0, f64::max)

@@ -17,6 +17,7 @@ mod detector;
 mod effect;
 mod field;
 mod levels;
+mod light;
 mod mechanics;
 mod nominal;
 mod optics;

@@ -169,23 +169,76 @@ impl Solid {
         }
     }
 
-    /// How far along a ray (unit direction) it is first met beyond `from_m`, metres. On an edge it
-    /// is met.
-    #[allow(dead_code)] // the light on raised bodies is about to call for it
-    pub(crate) fn hit(&self, origin: DVec3, direction: DVec3, from_m: f64) -> Option<f64> {
+    /// How far along a ray (unit direction) it is last met between two distances, metres. On an edge
+    /// it is met.
+    pub(crate) fn last_hit(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        (from_m, to_m): (f64, f64),
+    ) -> Option<f64> {
+        let is_between = |at: &f64| *at > from_m && *at < to_m;
         if let Self::Sphere(ball) = self {
             let to_center = ball.center_m() - origin;
             let middle = direction.dot(to_center);
             let beside = (to_center - direction * middle).length_squared();
             let square = ball.radius_m() * ball.radius_m() - beside;
             let half = libm::sqrt((square >= 0.0).then_some(square)?);
-            return [middle - half, middle + half].into_iter().find(|at| *at > from_m);
+            return [middle + half, middle - half].into_iter().find(is_between);
         }
         let (at, normal) = self.plane();
         let rise = normal.dot(direction);
+        if rise == 0.0 {
+            return None;
+        }
         let distance = normal.dot(at - origin) / rise;
-        let is_ahead = rise != 0.0 && distance > from_m;
-        (is_ahead && self.holds(origin + direction * distance, 0.0)).then_some(distance)
+        let is_met = is_between(&distance) && self.holds(origin + direction * distance, 0.0);
+        is_met.then_some(distance)
+    }
+
+    /// A ball that holds it: its centre and radius; none for a half-plane.
+    pub(crate) fn bounding_ball(&self) -> Option<(DVec3, f64)> {
+        match self {
+            Self::Disk(disk) => Some((disk.center_m(), disk.radius_m())),
+            Self::HalfPlane(_) => None,
+            Self::Polygon(polygon) => {
+                let count = polygon.vertices().len() as f64;
+                let middle = polygon.vertices().iter().sum::<DVec3>() / count;
+                let radius = polygon.vertices().iter().map(|v| (*v - middle).length());
+                Some((middle, radius.fold(0.0, f64::max)))
+            }
+            Self::Sphere(ball) => Some((ball.center_m(), ball.radius_m())),
+        }
+    }
+
+    /// Its middle, and places within it near its outline.
+    pub(crate) fn points(&self) -> Vec<DVec3> {
+        const INSIDE: f64 = 0.99;
+        let round = |centre: DVec3, e: DVec3, f: DVec3| {
+            let at = move |i: u32| {
+                let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(i) / 12.0);
+                centre + (e * cos + f * sin) * INSIDE
+            };
+            core::iter::once(centre).chain((0..12).map(at)).collect::<Vec<_>>()
+        };
+        match self {
+            Self::Disk(disk) => {
+                let (e, f) = frame(normalised(disk.axis()).unwrap_or(DVec3::Z));
+                round(disk.center_m(), e * disk.radius_m(), f * disk.radius_m())
+            }
+            Self::HalfPlane(edge) => {
+                vec![DVec3::new(edge.x_max_m() - 1e-6, 0.0, edge.z_m())]
+            }
+            Self::Polygon(polygon) => {
+                let Some((middle, _)) = self.bounding_ball() else { return Vec::new() };
+                let near = polygon.vertices().iter().map(|v| middle + (*v - middle) * INSIDE);
+                core::iter::once(middle).chain(near).collect()
+            }
+            Self::Sphere(ball) => {
+                let radius = ball.radius_m();
+                round(ball.center_m(), DVec3::X * radius, DVec3::Y * radius)
+            }
+        }
     }
 }
 
@@ -336,14 +389,14 @@ mod tests {
     }
 
     #[test]
-    fn rays_meet_what_stands_before_them() {
+    fn rays_meet_what_stands_nearest_to_their_end() {
         let (origin, up) = (DVec3::new(0.1, 0.2, -1.0), DVec3::Z);
-        assert!((floor().hit(origin, up, 0.0).unwrap() - 1.0).abs() < 1e-15);
-        assert_eq!(floor().hit(origin, up, 1.5), None);
-        assert_eq!(floor().hit(DVec3::new(1.1, 0.0, -1.0), up, 0.0), None);
+        assert!((floor().last_hit(origin, up, (0.0, 9.0)).unwrap() - 1.0).abs() < 1e-15);
+        assert_eq!(floor().last_hit(origin, up, (1.5, 9.0)), None);
+        assert_eq!(floor().last_hit(DVec3::new(1.1, 0.0, -1.0), up, (0.0, 9.0)), None);
         let ball = Solid::Sphere(Sphere::new(DVec3::new(0.1, 0.2, 1.0), 0.5).unwrap());
-        assert!((ball.hit(origin, up, 0.0).unwrap() - 1.5).abs() < 1e-15);
-        assert!((ball.hit(origin, up, 2.0).unwrap() - 2.5).abs() < 1e-15);
+        assert!((ball.last_hit(origin, up, (0.0, 9.0)).unwrap() - 2.5).abs() < 1e-15);
+        assert!((ball.last_hit(origin, up, (0.0, 2.0)).unwrap() - 1.5).abs() < 1e-15);
         assert_eq!(ball.heights_m(), (0.5, 1.5));
     }
 }

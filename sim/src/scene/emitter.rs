@@ -59,6 +59,28 @@ impl Body {
         }
     }
 
+    /// Whether a part of each may lie before the side of the other that counts.
+    pub(crate) fn faces(&self, other: &Self) -> bool {
+        let sees = |from: &Self, to: &Self| match (from.solid(), to.solid()) {
+            (Some(Solid::Sphere(_)), _) => true,
+            (Some(from_solid), Some(to_solid)) => {
+                let (at, _) = from_solid.plane();
+                let normal = from.normal(at);
+                let margin = 1e-9 * from_solid.extent_m().max(to_solid.extent_m());
+                let top = match &to_solid {
+                    Solid::Sphere(ball) => normal.dot(ball.center_m() - at) + ball.radius_m(),
+                    flat => {
+                        let outline = flat.points().into_iter();
+                        outline.map(|p| normal.dot(p - at)).fold(f64::NEG_INFINITY, f64::max)
+                    }
+                };
+                top > margin
+            }
+            _ => false,
+        };
+        sees(self, other) && sees(other, self)
+    }
+
     pub(super) fn check(&self) -> Result<(), SceneError> {
         match self {
             Self::Flat(shape) if !shape.is_sound() => Err(SceneError::Shape(shape.clone())),

@@ -207,18 +207,32 @@ impl Scene {
         emitter.map_or(0.0, |emitter| emitter.radiance_at(x_m, y_m, theta_rad, phi_rad))
     }
 
-    /// What of the scene is more than light from patches on the sample's plane.
-    pub(crate) fn beyond_flat_emitters(&self) -> Option<String> {
-        let raised = self.emitters.iter().position(|emitter| emitter.shape().is_none());
-        let lists = [
-            ("surface", self.surfaces.len()),
-            ("occluder", self.occluders.len()),
-            ("window", self.windows.len()),
-        ];
-        let list = lists.iter().find(|(_, count)| *count > 0);
-        raised
-            .map(|i| format!("emitter[{i}] stands above the sample's plane"))
-            .or_else(|| list.map(|(what, _)| format!("{what}[0]")))
+    /// Whether there is nothing but patches that emit on the sample's plane. Lamps without anything
+    /// to shine on, at no place where they are seen, are nothing.
+    pub(crate) fn is_flat_emitters(&self) -> bool {
+        self.emitters.iter().all(|emitter| emitter.shape().is_some())
+            && self.surfaces.is_empty()
+            && self.occluders.is_empty()
+            && self.windows.is_empty()
+            && self.lamps.is_empty()
+    }
+
+    /// What is above the plane and lets no light pass, with the name that scene.toml's order gives it.
+    pub(crate) fn opaque(&self) -> Vec<(String, Solid)> {
+        let is_flat = |name: &str| {
+            let emitters = self.emitters.iter().enumerate();
+            let surfaces = self.surfaces.iter().enumerate();
+            emitters
+                .filter(|(_, emitter)| emitter.shape().is_some())
+                .map(|(i, _)| format!("emitter[{i}]"))
+                .chain(
+                    surfaces
+                        .filter(|(_, surface)| surface.body().shape().is_some())
+                        .map(|(i, _)| format!("surface[{i}]")),
+                )
+                .any(|flat| flat == name)
+        };
+        self.solids().into_iter().filter(|(name, _)| !is_flat(name)).collect()
     }
 
     /// Everything opaque, with the name that scene.toml's order gives it.

@@ -1,0 +1,192 @@
+//! What the light brings to the compiler: lamps, shadows on surfaces, bodies and windows in the
+//! detector's beam. Each one's influence is what the scene looks like with it and without it, over the
+//! rays that tell most of a region.
+
+use std::sync::Arc;
+
+use super::{Included, LitScene, landmarks, plain};
+use crate::compile::Setting;
+use crate::effect::{Candidate, Influence};
+use crate::field::Field;
+use crate::scene::{Body, Scene, Solid, WindowOwner};
+use crate::{CompileError, Region};
+
+/// What the rays that are looked at may miss of the largest influence.
+const MARGIN: f64 = 1.25;
+
+/// What is seen of a scene: from a distance, or (without one) what leaves the sample.
+pub(crate) fn field(
+    scene: &Arc<Scene>,
+    distance_m: Option<f64>,
+    is_in: Included<'_>,
+) -> Result<Arc<dyn Field>, CompileError> {
+    if let Some(plain) = plain(scene) {
+        return Ok(plain);
+    }
+    refuse(scene)?;
+    Ok(Arc::new(LitScene::new(scene, distance_m, is_in)?))
+}
+
+/// One for each lamp, occluder and window. None for a scene of flat emitters.
+pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, CompileError> {
+    let scene = setting.scene;
+    if scene.is_flat_emitters() {
+        return Ok(Vec::new());
+    }
+    let distance_m = Some(setting.nominal.detector.distance_m);
+    let whole = LitScene::new(scene, distance_m, &|_| true)?;
+    let weighing = Weighing { setting, distance_m, whole: &whole };
+    let mut found = Vec::new();
+    for (i, lamp) in scene.lamps().iter().enumerate() {
+        let lights = !scene.surfaces().is_empty() && lamp.radiance() > 0.0;
+        let cause = lights.then(|| format!("lamp[{i}].kind = \"{}\"", lamp.kind()));
+        let how = "irradiance of surfaces in closed form";
+        found.push(weighing.candidate(format!("lamp[{i}]"), cause, how)?);
+        if let Some(solid) = lamp.solid() {
+            let cause = weighing.in_beam(&format!("lamp[{i}]"), solid.heights_m());
+            let how = "the lamp is seen where a ray meets it before the detector";
+            found.push(weighing.candidate(format!("lamp-in-beam[{i}]"), cause, how)?);
+        }
+    }
+    let cells = landmarks::shaded(&whole, &setting.region);
+    for (i, occluder) in scene.occluders().iter().enumerate() {
+        let cause = shadow_fact(&format!("occluder[{i}]"), &cells, scene);
+        let how = "visible part of the source in closed form, where a shadow may fall; elsewhere \
+                   nothing is asked";
+        found.push(weighing.candidate(format!("shadow[{i}]"), cause, how)?);
+        let cause = weighing.in_beam(&format!("occluder[{i}]"), occluder.heights_m());
+        let how = "black where a ray meets it before the detector";
+        found.push(weighing.candidate(format!("beam-shadow[{i}]"), cause, how)?);
+    }
+    for (i, window) in scene.windows().iter().enumerate() {
+        let owner = match window.belongs_to {
+            WindowOwner::Beam => "beam",
+            WindowOwner::Sample => "sample",
+        };
+        let cause = format!("window[{i}].index = {}, of the {owner}", window.index);
+        let how = "Fresnel's and Beer's laws with all reflections inside; the ray shifted sideways";
+        found.push(weighing.candidate(format!("window[{i}]"), Some(cause), how)?);
+    }
+    Ok(found)
+}
+
+struct Weighing<'w> {
+    setting: &'w Setting<'w>,
+    distance_m: Option<f64>,
+    whole: &'w LitScene,
+}
+
+impl Weighing<'_> {
+    /// Weighed by looking with it and without it.
+    fn candidate(
+        &self,
+        name: String,
+        cause: Option<String>,
+        how_in: &str,
+    ) -> Result<Candidate, CompileError> {
+        let influence = match &cause {
+            Some(_) => self.influence(&name)?,
+            None => 0.0,
+        };
+        let how_out = match &cause {
+            Some(_) => "the light is taken as without it",
+            None => "not called for: it changes nothing that is seen in the region",
+        };
+        Ok(Candidate {
+            name,
+            cause,
+            influence: Influence::Relative(influence),
+            error: None,
+            how_in: how_in.to_owned(),
+            how_out: how_out.to_owned(),
+        })
+    }
+
+    /// The largest |with - without| / max(with, without, noise floor) over the region's rays.
+    fn influence(&self, name: &str) -> Result<f64, CompileError> {
+        let (scene, region) = (self.setting.scene, &self.setting.region);
+        let without = LitScene::new(scene, self.distance_m, &|other| other != name)?;
+        let largest = self.whole.landmarks(region).iter().fold(0.0, |largest: f64, ray| {
+            let (a, b) = (self.whole.radiance(ray), without.radiance(ray));
+            let scale = a.max(b).max(self.setting.floor);
+            if scale > 0.0 { largest.max((a - b).abs() / scale) } else { largest }
+        });
+        Ok((MARGIN * largest).min(1.0))
+    }
+
+    /// Whether a body may stand between the region and the detector: whether a ray of the region is as
+    /// high as the body before it is as far as the detector.
+    fn in_beam(&self, body: &str, (low, _): (f64, f64)) -> Option<String> {
+        let detector = &self.setting.nominal.detector;
+        let part = self.whole.raised.iter().find(|part| part.name == body)?;
+        let Body::Raised(solid) = &part.body else { return None };
+        let Region { x_m, y_m, theta_max_rad } = self.setting.region;
+        let (sin, cos) = libm::sincos(theta_max_rad);
+        let is_reached = match (solid, solid.bounding_ball()) {
+            (Solid::HalfPlane(edge), _) => {
+                let aside = (x_m.0 - edge.x_max_m()).max(0.0);
+                let is_ahead = libm::hypot(aside, edge.z_m()) < detector.distance_m;
+                is_ahead && aside * cos < edge.z_m() * sin
+            }
+            (_, Some((centre, radius_m))) => {
+                let aside = libm::hypot(
+                    centre.x - centre.x.clamp(x_m.0, x_m.1),
+                    centre.y - centre.y.clamp(y_m.0, y_m.1),
+                );
+                // A ray up to θ from the normal is aside by z tan θ at most; the ball adds r / cos θ.
+                let is_ahead = libm::hypot(aside, centre.z) - radius_m < detector.distance_m;
+                is_ahead && aside * cos <= centre.z * sin + radius_m
+            }
+            (_, None) => true,
+        };
+        is_reached.then(|| {
+            format!(
+                "{body} stands between the region and the detector, at z from {:.3} mm",
+                low * 1e3
+            )
+        })
+    }
+}
+
+/// Where which source is behind a body, for a person.
+fn shadow_fact(body: &str, cells: &[landmarks::ShadedCell], scene: &Scene) -> Option<String> {
+    let before = |cell: &landmarks::ShadedCell| {
+        cell.shades.iter().find(|shade| shade.body == body).map(|shade| shade.source.clone())
+    };
+    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let mut shaded = cells.iter().filter_map(|cell| Some((before(cell)?, cell)));
+    let on_plane = shaded.next().map(|(source, first)| {
+        let rest = shaded.map(|(_, cell)| (cell.x_m, cell.y_m));
+        let (x, y) = rest
+            .fold((first.x_m, first.y_m), |all, cell| (wider(all.0, cell.0), wider(all.1, cell.1)));
+        format!(
+            "{body} comes between {source} and {} for x from {:.3} to {:.3} mm, y from {:.3} to \
+             {:.3} mm",
+            first.surface,
+            x.0 * 1e3,
+            x.1 * 1e3,
+            y.0 * 1e3,
+            y.1 * 1e3
+        )
+    });
+    let raised = scene.surfaces().iter().position(|surface| surface.body().shape().is_none());
+    on_plane.or_else(|| raised.map(|i| format!("{body} may shade surface[{i}], which is raised")))
+}
+
+/// What is not simulated, by name.
+fn refuse(scene: &Scene) -> Result<(), CompileError> {
+    for (i, surface) in scene.surfaces().iter().enumerate() {
+        if !surface.reflection().is_lambertian() {
+            return Err(CompileError::Unsupported(format!("surface[{i}].kind = \"glossy\"")));
+        }
+        for (k, other) in scene.surfaces().iter().enumerate().skip(i + 1) {
+            let reflects = surface.reflection().albedo > 0.0 && other.reflection().albedo > 0.0;
+            if reflects && surface.body().faces(other.body()) {
+                return Err(CompileError::Unsupported(format!(
+                    "surface[{i}] and surface[{k}] see each other: light that goes between them"
+                )));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,118 @@
+//! Rays of a region that tell most of what is seen there: a grid, the places into which shadows may
+//! fall, and the bodies that stand in the way.
+
+use glam::DVec3;
+use radiometry::direction::angles;
+use radiometry::projected;
+use radiometry::shape::Polygon;
+
+use super::lamps::Shade;
+use super::{Glow, LitScene};
+use crate::Region;
+use crate::field::{Field, Ray, grid};
+use crate::scene::Body;
+
+/// Cells along each side of a region, 2 to this power, of which each is asked for shadows.
+const HALVINGS: u32 = 5;
+/// Steps along each side where nothing is known of shadows.
+const STEPS: u32 = 16;
+
+pub(super) fn of(lit: &LitScene, region: &Region) -> Vec<Ray> {
+    let mut rays = if lit.is_even() { Vec::new() } else { grid(region) };
+    rays.extend(towards_bodies(lit, region));
+    if lit.flat.iter().any(|part| matches!(part.glow, Glow::Lit(..))) {
+        let at =
+            |(low, high): (f64, f64), i: u32| low + (high - low) * f64::from(i) / f64::from(STEPS);
+        for i in 0..=STEPS {
+            rays.extend(
+                (0..=STEPS).map(|k| Ray::new(at(region.x_m, i), at(region.y_m, k), 0.0, 0.0)),
+            );
+        }
+        for cell in shaded(lit, region) {
+            let (x, y) = cell.middle();
+            rays.push(Ray::new(x, y, 0.0, 0.0));
+            rays.extend(cell.corners().map(|(x, y)| Ray::new(x, y, 0.0, 0.0)));
+        }
+    }
+    rays
+}
+
+/// A small rectangle of the sample's plane into which a shadow may fall, and whose.
+pub(super) struct ShadedCell {
+    pub(super) x_m: (f64, f64),
+    pub(super) y_m: (f64, f64),
+    pub(super) surface: String,
+    pub(super) shades: Vec<Shade>,
+}
+
+impl ShadedCell {
+    fn middle(&self) -> (f64, f64) {
+        (f64::midpoint(self.x_m.0, self.x_m.1), f64::midpoint(self.y_m.0, self.y_m.1))
+    }
+
+    fn corners(&self) -> [(f64, f64); 4] {
+        let (x, y) = (self.x_m, self.y_m);
+        [(x.0, y.0), (x.1, y.0), (x.1, y.1), (x.0, y.1)]
+    }
+}
+
+/// The cells of a region's flat surfaces that are not certain to be unshaded: halved and halved again,
+/// so that no shadow is missed however small it is.
+pub(super) fn shaded(lit: &LitScene, region: &Region) -> Vec<ShadedCell> {
+    let mut found = Vec::new();
+    for part in &lit.flat {
+        let (Glow::Lit(_, lighting), Some(shape)) = (&part.glow, part.body.shape()) else {
+            continue;
+        };
+        let (x, y) = shape.bounding_box();
+        let within = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.min(b.1));
+        let mut open = vec![(within(x, region.x_m), within(y, region.y_m), HALVINGS)];
+        while let Some((x, y, halvings)) = open.pop() {
+            if x.0 >= x.1 || y.0 >= y.1 {
+                continue;
+            }
+            let corners = [(x.0, y.0), (x.1, y.0), (x.1, y.1), (x.0, y.1)];
+            let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
+            let Ok(polygon) = Polygon::new(corners) else { continue };
+            let shades = lighting.shades(&projected::Region::Polygon(polygon));
+            if shades.is_empty() {
+                continue;
+            }
+            if halvings == 0 {
+                let surface = part.name.clone();
+                found.push(ShadedCell { x_m: x, y_m: y, surface, shades });
+                continue;
+            }
+            let (mx, my) = (f64::midpoint(x.0, x.1), f64::midpoint(y.0, y.1));
+            for x in [(x.0, mx), (mx, x.1)] {
+                open.extend([(x, (y.0, my), halvings - 1), (x, (my, y.1), halvings - 1)]);
+            }
+        }
+    }
+    found
+}
+
+/// Rays through the middle of each raised body and just inside its outline, as far as the region has
+/// them.
+fn towards_bodies(lit: &LitScene, region: &Region) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for part in &lit.raised {
+        let Body::Raised(solid) = &part.body else { continue };
+        for target in solid.points() {
+            for (x, y) in corners_and_middle(region) {
+                let apart = target - DVec3::new(x, y, 0.0);
+                let (theta, phi) = angles(apart);
+                if apart.length() > 0.0 && theta <= region.theta_max_rad {
+                    rays.push(Ray::new(x, y, theta, phi));
+                }
+            }
+        }
+    }
+    rays
+}
+
+fn corners_and_middle(region: &Region) -> [(f64, f64); 5] {
+    let (x, y) = (region.x_m, region.y_m);
+    let middle = (f64::midpoint(x.0, x.1), f64::midpoint(y.0, y.1));
+    [(x.0, y.0), (x.1, y.0), (x.1, y.1), (x.0, y.1), middle]
+}

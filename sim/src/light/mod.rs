@@ -1,0 +1,194 @@
+//! What is seen along a ray of a scene with everything in it: emitters, lit surfaces, raised bodies,
+//! windows, and what stands in the detector's beam. It knows no beam of a width and no detector but
+//! how far away that stands.
+
+mod effects;
+mod lamps;
+mod landmarks;
+mod plate;
+
+use std::sync::Arc;
+
+use core::f64::consts::PI;
+
+use glam::DVec3;
+use radiometry::projected::Occluder;
+
+pub(crate) use effects::{candidates, field};
+
+use crate::field::{Field, Ray};
+use crate::scene::{Body, Emitter, Law, Reflection, Scene, Solid, WindowOwner};
+use crate::{CompileError, Region};
+use lamps::Lighting;
+use plate::Plate;
+
+/// Which of a scene's effects are in, by their names.
+pub(crate) type Included<'i> = &'i dyn Fn(&str) -> bool;
+
+/// A scene as it looks.
+#[derive(Debug)]
+pub(crate) struct LitScene {
+    /// What lies in the sample's plane, then what stands above it.
+    flat: Vec<Part>,
+    raised: Vec<Part>,
+    /// The highest first.
+    plates: Vec<Plate>,
+    /// How far the detector is from the sample's plane, along its beam; nothing farther is in its
+    /// way. Infinite for what leaves the sample.
+    reach_m: f64,
+}
+
+/// One body of it.
+#[derive(Debug)]
+struct Part {
+    name: String,
+    body: Body,
+    glow: Glow,
+}
+
+/// What a body sends out.
+#[derive(Debug)]
+enum Glow {
+    Black,
+    Emits(Emitter),
+    /// The same everywhere, from both faces.
+    Lamp(f64),
+    Lit(Reflection, Lighting),
+}
+
+impl LitScene {
+    /// What the detector sees at a distance, or (without one) what leaves the sample.
+    pub(crate) fn new(
+        scene: &Scene,
+        distance_m: Option<f64>,
+        is_in: Included<'_>,
+    ) -> Result<Self, CompileError> {
+        let mut parts = Vec::new();
+        for (i, emitter) in scene.emitters().iter().enumerate() {
+            let (name, body) = (format!("emitter[{i}]"), emitter.body().clone());
+            parts.push(Part { name, body, glow: Glow::Emits(emitter.clone()) });
+        }
+        let sources = lamps::sources(scene, is_in)?;
+        for (i, surface) in scene.surfaces().iter().enumerate() {
+            let lighting = Lighting::new(scene, i, &sources, is_in)?;
+            let glow = Glow::Lit(*surface.reflection(), lighting);
+            parts.push(Part { name: format!("surface[{i}]"), body: surface.body().clone(), glow });
+        }
+        if distance_m.is_some() {
+            in_the_beam(scene, is_in, &mut parts);
+        }
+        let (flat, raised) = parts.into_iter().partition(|part| part.body.shape().is_some());
+        let windows = scene.windows().iter().enumerate().filter(|(i, window)| {
+            let is_seen = distance_m.is_some() || window.belongs_to == WindowOwner::Sample;
+            is_seen && is_in(&format!("window[{i}]"))
+        });
+        let plates = windows.map(|(i, window)| {
+            Plate::new(window).map_err(|e| CompileError::Scene(format!("window[{i}]: {e}")))
+        });
+        let mut plates = plates.collect::<Result<Vec<_>, _>>()?;
+        plates.sort_by(|a, b| b.low_m().total_cmp(&a.low_m()));
+        Ok(Self { flat, raised, plates, reach_m: distance_m.unwrap_or(f64::INFINITY) })
+    }
+
+    /// What is raised and nearest to the detector, of the part of a ray between two distances from
+    /// the sample's plane.
+    fn raised_along(&self, ray: &Ray, (from, to): (f64, f64)) -> Option<f64> {
+        let hits = self.raised.iter().filter_map(|part| {
+            let Body::Raised(solid) = &part.body else { return None };
+            Some((solid.last_hit(ray.point, ray.direction, (from, to))?, part))
+        });
+        let (distance, part) = hits.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(part.radiance(ray.point + ray.direction * distance, ray.direction))
+    }
+
+    fn flat_at(&self, ray: &Ray) -> f64 {
+        let part = self.flat.iter().find(|part| {
+            part.body.shape().is_some_and(|shape| shape.contains(ray.point.x, ray.point.y))
+        });
+        part.map_or(0.0, |part| part.radiance(ray.point, ray.direction))
+    }
+}
+
+/// What the detector's beam may meet before the sample: occluders, and lamps that have a place.
+fn in_the_beam(scene: &Scene, is_in: Included<'_>, parts: &mut Vec<Part>) {
+    for (i, occluder) in scene.occluders().iter().enumerate() {
+        if is_in(&format!("beam-shadow[{i}]")) {
+            let (name, body) = (format!("occluder[{i}]"), Body::Raised(occluder.clone()));
+            parts.push(Part { name, body, glow: Glow::Black });
+        }
+    }
+    for (i, lamp) in scene.lamps().iter().enumerate() {
+        let Some(solid) = lamp.solid().filter(|_| is_in(&format!("lamp-in-beam[{i}]"))) else {
+            continue;
+        };
+        let (name, body) = (format!("lamp[{i}]"), Body::Raised(solid.clone()));
+        parts.push(Part { name, body, glow: Glow::Lamp(lamp.radiance()) });
+    }
+}
+
+impl Part {
+    fn radiance(&self, place: DVec3, direction: DVec3) -> f64 {
+        match &self.glow {
+            Glow::Black => 0.0,
+            Glow::Emits(emitter) => emitter.radiance_from(place, direction),
+            Glow::Lamp(radiance) => *radiance,
+            Glow::Lit(reflection, lighting) => {
+                let normal = self.body.normal(place);
+                if normal.dot(direction) <= 0.0 {
+                    return 0.0;
+                }
+                reflection.albedo / PI * lighting.irradiance(place, normal)
+            }
+        }
+    }
+}
+
+impl Field for LitScene {
+    fn radiance(&self, ray: &Ray) -> f64 {
+        let rise = ray.direction.z;
+        let (mut ray, mut passes, mut top) = (*ray, 1.0, self.reach_m);
+        for plate in &self.plates {
+            let upper = plate.high_m() / rise;
+            if upper >= self.reach_m {
+                continue;
+            }
+            if let Some(radiance) = self.raised_along(&ray, (upper, top)) {
+                return passes * radiance;
+            }
+            let passage = plate.passage(ray.direction);
+            passes *= passage.transmittance;
+            ray.point += passage.shift_m;
+            top = plate.low_m() / rise;
+        }
+        let raised = self.raised_along(&ray, (0.0, top));
+        passes * raised.unwrap_or_else(|| self.flat_at(&ray))
+    }
+
+    fn landmarks(&self, region: &Region) -> Vec<Ray> {
+        landmarks::of(self, region)
+    }
+
+    fn is_even(&self) -> bool {
+        let is_even = |part: &Part| match &part.glow {
+            Glow::Emits(emitter) => *emitter.law() == Law::Lambertian,
+            Glow::Lit(reflection, _) => reflection.is_lambertian(),
+            Glow::Black | Glow::Lamp(_) => true,
+        };
+        self.plates.is_empty() && self.raised.is_empty() && self.flat.iter().all(is_even)
+    }
+}
+
+/// A body as radiometry's kernels take it.
+fn occluder_of(solid: &Solid) -> Occluder {
+    match solid {
+        Solid::Disk(disk) => Occluder::Disk(*disk),
+        Solid::HalfPlane(edge) => Occluder::HalfPlane(*edge),
+        Solid::Polygon(polygon) => Occluder::Polygon(polygon.clone()),
+        Solid::Sphere(ball) => Occluder::Sphere(*ball),
+    }
+}
+
+/// The field of a scene without anything but flat emitters is the scene itself.
+pub(crate) fn plain(scene: &Arc<Scene>) -> Option<Arc<dyn Field>> {
+    scene.is_flat_emitters().then(|| Arc::clone(scene) as Arc<dyn Field>)
+}
