@@ -211,6 +211,74 @@ fn a_sunlit_panel_behind_glass_and_under_a_sky_is_as_bright_as_their_laws_say() 
 }
 
 #[test]
+fn glass_throws_light_back_as_rays_find() {
+    let text = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.9\nx_mm = [-30, 30]\ny_mm = [-20, 20]\n\
+                [[lamp]]\nkind = \"sun\"\ntheta_deg = 30\n\
+                [[window]]\nz_mm = 25\nthickness_mm = 2\nindex = 1.6\nabsorption_per_mm = 0.02\n\
+                belongs_to = \"sample\"\n";
+    let with = compiled(text, &terms(10.0, 60.0));
+    let mut less = terms(10.0, 60.0);
+    less.without.push("window-return[0]".to_owned());
+    let without = compiled(text, &less);
+    let ray = Ray::new(0.01, 0.005, 0.0, 0.0);
+    let found = with.radiance(&ray) / without.radiance(&ray) - 1.0;
+    // Light that leaves a place evenly over the projected hemisphere, met by the plate and traced
+    // through it, face by face, until it is out or back: one reflection by the plate after another.
+    let mut dice = Dice(9);
+    let (count, mut back) = (400_000, 0.0);
+    let start = DVec3::new(0.01, 0.005, 0.0);
+    for _ in 0..count {
+        let (mut at, mut weight) = (start, 1.0);
+        for _ in 0..4 {
+            let (sin, turn) = (dice.roll().sqrt(), TAU * dice.roll());
+            let cos = (1.0 - sin * sin).sqrt();
+            let inside = (1.0 - sin * sin / 2.56).sqrt();
+            let (rs, rp) = {
+                let s = (cos - 1.6 * inside) / (cos + 1.6 * inside);
+                let p = (1.6 * cos - inside) / (1.6 * cos + inside);
+                (s * s, p * p)
+            };
+            // Polarised one way or the other; inside the plate to and fro.
+            let r = if dice.roll() < 0.5 { rs } else { rp };
+            let aside = DVec3::new(turn.cos(), turn.sin(), 0.0);
+            let (step, inner) = (25e-3 * sin / cos, 2e-3 * sin / 1.6 / inside);
+            let passed = (-20.0 * 2e-3 / inside).exp();
+            let mut travelled = 2.0 * step;
+            let mut reflected = dice.roll() < r;
+            if !reflected {
+                // Up, and down again, as long as it stays inside.
+                loop {
+                    weight *= passed;
+                    if dice.roll() >= r {
+                        break;
+                    }
+                    weight *= passed;
+                    travelled += 2.0 * inner;
+                    if dice.roll() >= r {
+                        reflected = true;
+                        break;
+                    }
+                }
+            }
+            at += aside * travelled;
+            let on_patch = at.x.abs() <= 0.03 && at.y.abs() <= 0.02;
+            if !reflected || !on_patch {
+                break;
+            }
+            weight *= 0.9;
+            // Reciprocity: what would leave here and end there lights as much the other way.
+            back += weight;
+        }
+    }
+    let expected = back / f64::from(count);
+    assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
+    assert!(found > 0.01, "{found}");
+    let row = with.effects().iter().find(|row| row.name == "window-return[0]").unwrap();
+    assert!(row.included && row.bound.unwrap().value >= found);
+    assert!(row.error.unwrap() < 1e-3, "{row:?}");
+}
+
+#[test]
 fn what_is_not_simulated_is_refused_by_name() {
     let lamp = "[[lamp]]\nkind = \"sphere\"\ncentre_mm = [0, 0, 200]\nradius_mm = 5\n\
                 radiance_w_per_m2_sr = 10\n";

@@ -8,7 +8,7 @@ use super::{Included, LitScene, landmarks, plain};
 use crate::compile::Setting;
 use crate::effect::{Candidate, Influence};
 use crate::field::Field;
-use crate::scene::{Body, Scene, Solid, WindowOwner};
+use crate::scene::{Body, Emitter, Scene, Solid, Surface, Window, WindowOwner};
 use crate::{CompileError, Region};
 
 /// What the rays that are looked at may miss of the largest influence.
@@ -66,6 +66,17 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         let cause = format!("window[{i}].index = {}, of the {owner}", window.index);
         let how = "Fresnel's and Beer's laws with all reflections inside; the ray shifted sideways";
         found.push(weighing.candidate(format!("window[{i}]"), Some(cause), how)?);
+        let returns = returning(scene)?.is_some_and(|(returning, _)| returning == i);
+        let cause = returns.then(|| format!("window[{i}] mirrors the patches below it"));
+        let how = "solved once, at nodes on each patch";
+        let mut candidate = weighing.candidate(format!("window-return[{i}]"), cause, how)?;
+        let error = whole.returned.as_ref().filter(|_| returns).map(|returned| returned.error);
+        // A part of what is thrown back, which is a part of the reading.
+        candidate.error = error.map(|error| match candidate.influence {
+            Influence::Relative(influence) => error * influence,
+            Influence::Mandatory(_) | Influence::Sized(_) => error,
+        });
+        found.push(candidate);
     }
     Ok(found)
 }
@@ -171,6 +182,30 @@ fn shadow_fact(body: &str, cells: &[landmarks::ShadedCell], scene: &Scene) -> Op
     });
     let raised = scene.surfaces().iter().position(|surface| surface.body().shape().is_none());
     on_plane.or_else(|| raised.map(|i| format!("{body} may shade surface[{i}], which is raised")))
+}
+
+/// The window that throws light back on the patches of the sample's plane, if one does.
+pub(super) fn returning(scene: &Scene) -> Result<Option<(usize, &Window)>, CompileError> {
+    let reflects = |surface: &Surface| surface.reflection().reflectance_bound() > 0.0;
+    if !scene.surfaces().iter().any(reflects) {
+        return Ok(None);
+    }
+    let windows = scene.windows().iter().enumerate();
+    let mut own = windows.filter(|(_, window)| window.belongs_to == WindowOwner::Sample);
+    let (Some((i, window)), further) = (own.next(), own.next()) else { return Ok(None) };
+    let is_raised = |body: &Body| {
+        body.solid().is_some_and(|solid| body.shape().is_none() && solid.heights_m().0 < window.z_m)
+    };
+    let bodies = scene.emitters().iter().map(Emitter::body);
+    let raised = bodies.chain(scene.surfaces().iter().map(Surface::body)).any(is_raised);
+    let blocked = scene.opaque().iter().any(|(_, solid)| solid.heights_m().0 < window.z_m);
+    if further.is_some() || raised || blocked {
+        return Err(CompileError::Unsupported(format!(
+            "light that window[{i}] throws back on surfaces, with a second window or with bodies \
+             below it"
+        )));
+    }
+    Ok(Some((i, window)))
 }
 
 /// What is not simulated, by name.

@@ -6,6 +6,7 @@ mod effects;
 mod lamps;
 mod landmarks;
 mod plate;
+mod returned;
 
 use std::sync::Arc;
 
@@ -21,6 +22,7 @@ use crate::scene::{Body, Emitter, Law, Reflection, Scene, Solid, WindowOwner};
 use crate::{CompileError, Region};
 use lamps::Lighting;
 use plate::Plate;
+use returned::{Patch, Returned};
 
 /// Which of a scene's effects are in, by their names.
 pub(crate) type Included<'i> = &'i dyn Fn(&str) -> bool;
@@ -33,6 +35,8 @@ pub(crate) struct LitScene {
     raised: Vec<Part>,
     /// The highest first.
     plates: Vec<Plate>,
+    /// What the sample's window throws back on its plane.
+    returned: Option<Returned>,
     /// How far the detector is from the sample's plane, along its beam; nothing farther is in its
     /// way. Infinite for what leaves the sample.
     reach_m: f64,
@@ -87,7 +91,34 @@ impl LitScene {
         });
         let mut plates = plates.collect::<Result<Vec<_>, _>>()?;
         plates.sort_by(|a, b| b.low_m().total_cmp(&a.low_m()));
-        Ok(Self { flat, raised, plates, reach_m: distance_m.unwrap_or(f64::INFINITY) })
+        let reach_m = distance_m.unwrap_or(f64::INFINITY);
+        let mut lit = Self { flat, raised, plates, returned: None, reach_m };
+        lit.returned = lit.thrown_back(scene, is_in)?;
+        Ok(lit)
+    }
+
+    /// Of the sample's window, if it has one and patches that it can light.
+    fn thrown_back(
+        &self,
+        scene: &Scene,
+        is_in: Included<'_>,
+    ) -> Result<Option<Returned>, CompileError> {
+        let Some((i, window)) = effects::returning(scene)? else { return Ok(None) };
+        if !is_in(&format!("window-return[{i}]")) || !is_in(&format!("window[{i}]")) {
+            return Ok(None);
+        }
+        let plate = Plate::new(window);
+        let plate = plate.map_err(|e| CompileError::Scene(format!("window[{i}]: {e}")))?;
+        let patches = self.flat.iter().filter_map(|part| match &part.glow {
+            Glow::Emits(emitter) => Some(Patch::Emits(emitter)),
+            Glow::Lit(reflection, lighting) => {
+                let shape = part.body.shape()?;
+                Some(Patch::Lit { shape, albedo: reflection.albedo, lighting })
+            }
+            Glow::Black | Glow::Lamp(_) => None,
+        });
+        let patches: Vec<Patch<'_>> = patches.collect();
+        Ok(Some(Returned::new(plate, &patches)))
     }
 
     /// What is raised and nearest to the detector, of the part of a ray between two distances from
@@ -98,14 +129,14 @@ impl LitScene {
             Some((solid.last_hit(ray.point, ray.direction, (from, to))?, part))
         });
         let (distance, part) = hits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(part.radiance(ray.point + ray.direction * distance, ray.direction))
+        Some(part.radiance(ray.point + ray.direction * distance, ray.direction, None))
     }
 
     fn flat_at(&self, ray: &Ray) -> f64 {
         let part = self.flat.iter().find(|part| {
             part.body.shape().is_some_and(|shape| shape.contains(ray.point.x, ray.point.y))
         });
-        part.map_or(0.0, |part| part.radiance(ray.point, ray.direction))
+        part.map_or(0.0, |part| part.radiance(ray.point, ray.direction, self.returned.as_ref()))
     }
 }
 
@@ -127,7 +158,7 @@ fn in_the_beam(scene: &Scene, is_in: Included<'_>, parts: &mut Vec<Part>) {
 }
 
 impl Part {
-    fn radiance(&self, place: DVec3, direction: DVec3) -> f64 {
+    fn radiance(&self, place: DVec3, direction: DVec3, returned: Option<&Returned>) -> f64 {
         match &self.glow {
             Glow::Black => 0.0,
             Glow::Emits(emitter) => emitter.radiance_from(place, direction),
@@ -137,7 +168,8 @@ impl Part {
                 if normal.dot(direction) <= 0.0 {
                     return 0.0;
                 }
-                reflection.albedo / PI * lighting.irradiance(place, normal)
+                let back = returned.map_or(0.0, |returned| returned.irradiance(place.truncate()));
+                reflection.albedo / PI * (lighting.irradiance(place, normal) + back)
             }
         }
     }

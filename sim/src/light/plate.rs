@@ -1,7 +1,7 @@
 //! A window in a ray's way: what of the light passes, and by how much the ray is shifted.
 
 use glam::DVec3;
-use radiometry::interface::{Incidence, Window as Pane};
+use radiometry::interface::{Incidence, Interface, Window as Pane};
 
 use crate::scene::{SceneError, Window};
 
@@ -55,6 +55,19 @@ impl Plate {
             transmittance: self.pane.transmittance(incidence),
             shift_m: DVec3::new(direction.x, direction.y, 0.0) * (self.thickness_m * part),
         }
+    }
+
+    /// How thick it looks from below, straight up: d/n.
+    pub(super) fn apparent_thickness_m(&self) -> f64 {
+        self.thickness_m / self.index
+    }
+
+    /// What its lower face throws back at an angle with this cosine, and what all of it does.
+    pub(super) fn reflectances(&self, cos: f64) -> (f64, f64) {
+        let Ok(incidence) = Incidence::from_cos(cos.clamp(0.0, 1.0)) else { return (1.0, 1.0) };
+        let face = Interface::new(1.0, self.index);
+        let lower = face.map_or(1.0, |face| face.reflectance(incidence));
+        (lower, self.pane.reflectance(incidence))
     }
 
     /// What passes, towards a unit direction above the plane.
