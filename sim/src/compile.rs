@@ -34,6 +34,9 @@ pub struct Compiled {
     pub(crate) kinematics: Arc<dyn Kinematics>,
     /// When a reading looks while the axes move.
     pub(crate) moments: Vec<Moment>,
+    /// What the detector sees along a ray.
+    seen: Arc<dyn Field>,
+    /// What leaves the sample.
     field: Arc<dyn Field>,
     pub(crate) optics: Arc<dyn Optics>,
     /// Photocurrent per radiance: responsivity times throughput, both as drawn; A per W·m⁻²·sr⁻¹.
@@ -127,6 +130,11 @@ pub fn compile(
         return Err(CompileError::Quantity { scene, rig });
     }
     check(&nominal, &simulated, terms)?;
+    let has_stray = simulated.detector.stray_light_fraction_of_flux != 0.0;
+    if has_stray && !scene.surfaces().is_empty() {
+        let what = "simulated.stray_light_fraction_of_flux of a scene with surfaces";
+        return Err(CompileError::Unsupported(what.to_owned()));
+    }
     let scene = Arc::new(scene);
     let mut setting = Setting::new(&scene, &nominal, &simulated, terms)?;
     let tolerance = setting.tolerance;

@@ -15,7 +15,7 @@ use crate::field::{Field, Patch, Ray};
 const STOP_DEGREE: usize = 13;
 
 /// By the rays of a rule.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct ByRays {
     field: Arc<dyn Field>,
     beam: Beam,
@@ -41,10 +41,14 @@ impl Optics for ByRays {
             Ray::through(point, direction).map_or(0.0, |ray| self.field.radiance(&ray))
         })
     }
+
+    fn looking_at(&self, field: Arc<dyn Field>) -> Arc<dyn Optics> {
+        Arc::new(Self { field, ..self.clone() })
+    }
 }
 
 /// Over flat patches, which are all that there is to see.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct OverPatches {
     field: Arc<dyn Field>,
     patches: Vec<Patch>,
@@ -141,5 +145,10 @@ impl Optics for OverPatches {
             },
             None => self.across(axis),
         }
+    }
+
+    fn looking_at(&self, field: Arc<dyn Field>) -> Arc<dyn Optics> {
+        let inside = ByRays { field: Arc::clone(&field), ..self.inside.clone() };
+        Arc::new(Self { field, inside, ..self.clone() })
     }
 }

@@ -38,6 +38,9 @@ pub struct Axis {
 pub(crate) trait Optics: fmt::Debug + Send + Sync {
     /// Mean radiance over the beam, weighted with its throughput.
     fn radiance(&self, axis: &Axis) -> f64;
+
+    /// The same, looking at something else.
+    fn looking_at(&self, field: Arc<dyn Field>) -> Arc<dyn Optics>;
 }
 
 /// The beam's axis stands for all of it.
@@ -48,6 +51,10 @@ impl Optics for PointSampled {
     fn radiance(&self, axis: &Axis) -> f64 {
         let ray = Ray::through(axis.spot, axis.direction);
         ray.map_or(0.0, |ray| self.0.radiance(&ray))
+    }
+
+    fn looking_at(&self, field: Arc<dyn Field>) -> Arc<dyn Optics> {
+        Arc::new(Self(field))
     }
 }
 
