@@ -36,11 +36,11 @@ enum NodeGlow {
     Emits(Arc<Emitter>),
 }
 
-/// The light that a plate throws back on the plane.
+/// The light that a plate throws back on the plane: smooth over each patch, since it comes from as far
+/// as the plate, so that values at a few places stand for all.
 #[derive(Debug)]
 pub(super) struct Returned {
-    plate: Plate,
-    nodes: Vec<Node>,
+    smooth: Vec<Smooth>,
     /// How far irradiances may be off, relative to the largest direct one.
     pub(super) error: f64,
 }
@@ -53,20 +53,107 @@ pub(super) enum Patch<'p> {
 
 impl Returned {
     pub(super) fn new(plate: Plate, patches: &[Patch<'_>]) -> Self {
-        let solved = Self::solved(plate, patches, NODES);
-        let rough = Self::solved(plate, patches, FEWER);
-        let places = solved.nodes.iter().map(|node| node.place);
-        let mut largest = f64::MIN_POSITIVE;
-        let mut apart: f64 = 0.0;
-        for place in places {
+        let solved = Solved::new(plate, patches, NODES);
+        let rough = Solved::new(plate, patches, FEWER);
+        let smooth: Vec<Smooth> = patches
+            .iter()
+            .filter_map(|patch| match patch {
+                Patch::Lit { shape, .. } => Some(Smooth::new(shape, &solved)),
+                Patch::Emits(_) => None,
+            })
+            .collect();
+        let mut returned = Self { smooth, error: 0.0 };
+        let (mut largest, mut apart) = (f64::MIN_POSITIVE, 0.0_f64);
+        for place in solved.nodes.iter().map(|node| node.place) {
             let (fine, coarse) = (solved.irradiance(place), rough.irradiance(place));
             apart = apart.max((fine - coarse).abs());
+            apart = apart.max((fine - returned.irradiance(place)).abs());
             largest = largest.max(fine);
         }
-        Self { error: apart / largest, ..solved }
+        returned.error = apart / largest;
+        returned
     }
 
-    fn solved(plate: Plate, patches: &[Patch<'_>], count: usize) -> Self {
+    /// What comes back to a place of a lit patch, W·m⁻² or lm·m⁻².
+    pub(super) fn irradiance(&self, place: DVec2) -> f64 {
+        let on = self.smooth.iter().find(|smooth| smooth.holds(place));
+        on.map_or(0.0, |smooth| smooth.at(place))
+    }
+}
+
+/// A smooth function over a rectangle, interpolated between Chebyshev's points (Berrut and Trefethen
+/// 2004).
+#[derive(Debug)]
+struct Smooth {
+    x_m: (f64, f64),
+    y_m: (f64, f64),
+    /// Row after row along x.
+    values: Vec<f64>,
+    /// Chebyshev's points of [0, 1].
+    points: [f64; POINTS + 1],
+}
+
+/// Points along each side, less one.
+const POINTS: usize = 12;
+
+impl Smooth {
+    fn new(shape: &Shape, solved: &Solved) -> Self {
+        let (x_m, y_m) = shape.bounding_box();
+        let at = |(low, high): (f64, f64), i: usize| low + (high - low) * chebyshev(i);
+        let places = (0..=POINTS).flat_map(|k| (0..=POINTS).map(move |i| (i, k)));
+        let values = places.map(|(i, k)| solved.irradiance(DVec2::new(at(x_m, i), at(y_m, k))));
+        Self { x_m, y_m, values: values.collect(), points: core::array::from_fn(chebyshev) }
+    }
+
+    fn holds(&self, place: DVec2) -> bool {
+        let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+        within(self.x_m, place.x) && within(self.y_m, place.y)
+    }
+
+    fn at(&self, place: DVec2) -> f64 {
+        let part = |(low, high): (f64, f64), at: f64| (at - low) / (high - low);
+        let along = shares(&self.points, part(self.x_m, place.x));
+        let across = shares(&self.points, part(self.y_m, place.y));
+        let rows = self.values.chunks_exact(POINTS + 1).zip(across);
+        let row = |(values, share): (&[f64], f64)| {
+            share * values.iter().zip(along).map(|(value, share)| value * share).sum::<f64>()
+        };
+        rows.map(row).sum()
+    }
+}
+
+/// The i-th point of [0, 1].
+fn chebyshev(i: usize) -> f64 {
+    let half = libm::sin(PI * i as f64 / (2.0 * POINTS as f64));
+    half * half
+}
+
+/// What each point's value counts at a place of [0, 1].
+fn shares(points: &[f64; POINTS + 1], place: f64) -> [f64; POINTS + 1] {
+    let mut shares = [0.0; POINTS + 1];
+    for (i, share) in shares.iter_mut().enumerate() {
+        let apart = place - points[i];
+        if apart == 0.0 {
+            let mut one = [0.0; POINTS + 1];
+            one[i] = 1.0;
+            return one;
+        }
+        let ends = if i == 0 || i == POINTS { 0.5 } else { 1.0 };
+        *share = if i % 2 == 0 { ends } else { -ends } / apart;
+    }
+    let sum: f64 = shares.iter().sum();
+    shares.map(|share| share / sum)
+}
+
+/// What the plane sends up, once all is settled.
+#[derive(Debug)]
+struct Solved {
+    plate: Plate,
+    nodes: Vec<Node>,
+}
+
+impl Solved {
+    fn new(plate: Plate, patches: &[Patch<'_>], count: usize) -> Self {
         let (mut nodes, mut direct, mut albedos) = (Vec::new(), Vec::new(), Vec::new());
         for patch in patches {
             let shape = match patch {
@@ -94,7 +181,7 @@ impl Returned {
                 albedos.push(albedo);
             }
         }
-        let mut returned = Self { plate, nodes, error: 0.0 };
+        let mut returned = Self { plate, nodes };
         for _ in 0..ROUNDS {
             let places: Vec<DVec2> = returned.nodes.iter().map(|node| node.place).collect();
             let arriving = places.iter().map(|place| returned.irradiance(*place));
@@ -114,8 +201,8 @@ impl Returned {
         returned
     }
 
-    /// What comes back to a place of the plane, W·m⁻² or lm·m⁻².
-    pub(super) fn irradiance(&self, place: DVec2) -> f64 {
+    /// What comes back to a place of the plane.
+    fn irradiance(&self, place: DVec2) -> f64 {
         let near = 2.0 * self.plate.low_m();
         let far = near + 2.0 * self.plate.apparent_thickness_m();
         let of_node = |node: &Node| {
