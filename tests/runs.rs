@@ -26,7 +26,7 @@ fn rows(text: &str) -> Vec<Vec<&str>> {
 #[test]
 fn every_example_leaves_a_whole_folder() {
     std::thread::scope(|scope| {
-        for example in ["lambertian", "led-lobe", "luminaire"] {
+        for example in ["batwing", "lambertian", "led-lobe", "luminaire", "sun-window"] {
             scope.spawn(move || leaves_a_whole_folder(example));
         }
     });
