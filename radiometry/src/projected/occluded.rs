@@ -67,7 +67,7 @@ pub fn occluded_by(
     let whole = source.whole(receiver)?;
     let (receiver, source, occluders) = in_one_unit(receiver, source, occluders)?;
     let unoccluded = Estimate::closed(whole, 1000.0);
-    let scene = match Scene::new(&receiver, &source, &occluders)? {
+    let scene = match Scene::before(&receiver, &source, &occluders)? {
         Before::Bodies(scene) if whole > 0.0 => scene,
         Before::Umbra if whole > 0.0 => return Ok(Estimate::closed(0.0, 0.0)),
         _ => return Ok(unoccluded),

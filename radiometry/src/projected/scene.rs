@@ -33,7 +33,7 @@ pub(super) enum Before {
     /// A body that hides all of it.
     Umbra,
     /// Bodies that have to be looked at.
-    Bodies(Scene),
+    Bodies(Box<Scene>),
 }
 
 pub(super) struct Scene {
@@ -59,7 +59,7 @@ pub(super) struct Visible<'a> {
 
 impl Scene {
     /// All lengths in one unit.
-    pub(super) fn new(
+    pub(super) fn before(
         receiver: &Receiver,
         source: &Source,
         occluders: &[Occluder],
@@ -105,7 +105,8 @@ impl Scene {
         let has_horizon = horizon.is_some();
         hiding.splice(0..0, horizon);
         let levels = hiding.iter().filter_map(|seen| source.level_with(seen)).collect();
-        Ok(Before::Bodies(Self { view, source, hiding, levels, has_horizon }))
+        let scene = Self { view, source, hiding, levels, has_horizon };
+        Ok(Before::Bodies(Box::new(scene)))
     }
 
     /// Refused: a body that is in front of the source and behind.

@@ -54,7 +54,7 @@ pub fn shadow(
         return Ok(Shadow::Unseen);
     }
     let (receiver, source, occluders) = in_one_unit(receiver, source, occluders)?;
-    let scene = match Scene::new(&receiver, &source, &occluders)? {
+    let scene = match Scene::before(&receiver, &source, &occluders)? {
         Before::Nothing => return Ok(Shadow::Lit),
         Before::Umbra => return Ok(Shadow::Umbra),
         Before::Bodies(scene) => scene,
