@@ -1,13 +1,16 @@
 //! Convex hulls by their support, and whether two of them are certainly apart. They know no light.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
 use super::body::{Occluder, Source};
 use crate::direction::frame;
-use crate::shape::{Disk, Polygon};
+use crate::shape::{Disk, HalfPlane, Polygon};
 use crate::wide::length;
+
+/// Of coordinates that are at most 2.
+const ROUNDING: f64 = 1e-13;
 
 /// A convex set, or the convex hull of a polygon.
 #[derive(Debug, Clone)]
@@ -117,11 +120,36 @@ pub(super) fn disk_points(disk: &Disk, count: usize, factor: f64) -> Vec<DVec3> 
     (0..count).map(point).collect()
 }
 
+/// Whether a plane through the edge of a half-plane has region and source on its other side: the way to
+/// the nearest points alone comes too slowly to planes that leave little room. Lengths are at most 2.
+pub(super) fn are_beyond(region: &[DVec3], source: &Hull, edge: &HalfPlane) -> bool {
+    const HALVINGS: u32 = 60;
+    let point = DVec3::new(edge.x_max_m(), 0.0, edge.z_m());
+    let (mut low, mut high) = (-FRAC_PI_2, FRAC_PI_2);
+    for _ in 0..HALVINGS {
+        let angle = f64::midpoint(low, high);
+        let (sin, cos) = libm::sincos(angle);
+        let normal = DVec3::new(cos, 0.0, sin);
+        let (of_source, of_region) = (source.lowest(normal), lowest_of(region, normal));
+        let lit = if normal.dot(of_source) < normal.dot(of_region) { of_source } else { of_region };
+        let from_edge = lit - point;
+        if normal.dot(from_edge) > ROUNDING + source.slack() {
+            return true;
+        }
+        // Only a plane turned towards it has that point in front.
+        if cos * from_edge.z > sin * from_edge.x {
+            low = angle;
+        } else {
+            high = angle;
+        }
+    }
+    false
+}
+
 /// Whether a plane is found between a body and the hull of region and source: the way to their nearest
 /// points (Gilbert 1966), stopped as soon as the plane across it separates, or after so many steps.
 /// Lengths are at most 2.
 pub(super) fn are_apart(region: &[DVec3], source: &Hull, body: &Hull, steps: u32) -> bool {
-    const ROUNDING: f64 = 1e-13;
     let margin = ROUNDING + body.slack() + source.slack();
     let lowest = |direction: DVec3| {
         let (of_source, of_region) = (source.lowest(direction), lowest_of(region, direction));

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::Receiver;
 use super::body::{Occluder, Source, in_one_unit};
-use super::hull::{Hull, are_apart, disk_points};
+use super::hull::{Hull, are_apart, are_beyond, disk_points};
 use super::scene::{Before, Scene};
 use crate::domain::DomainError;
 use crate::shape::{Disk, Polygon};
@@ -129,8 +129,11 @@ pub fn region_shadow(
     let [occluder, region] = &bodies[..] else { return Ok(RegionShadow::Mixed) };
     let region = corners(region);
     let shining = Hull::of_source(&source);
-    let is_lit = Hull::of_occluder(occluder, &region, &shining)
-        .is_none_or(|body| are_apart(&region, &shining, &body, STEPS));
+    let is_beyond = |edge| are_beyond(&region, &shining, edge);
+    let is_clear = matches!(occluder, Occluder::HalfPlane(edge) if is_beyond(edge));
+    let is_lit = is_clear
+        || Hull::of_occluder(occluder, &region, &shining)
+            .is_none_or(|body| are_apart(&region, &shining, &body, STEPS));
     Ok(if is_lit {
         RegionShadow::Lit
     } else if is_umbra(&region, &shining, occluder) {
