@@ -124,6 +124,8 @@ fn compiled(rig: &Rig, is_in: impl Fn(&str) -> bool, seed: u64) -> Arc<Compiled>
     };
     let mut terms = Terms { force: names(true), seed, ..Terms::default() };
     terms.without = names(false);
+    // It is neither random nor drawn, and takes time to be weighed.
+    terms.without.push("finite-beam".to_owned());
     let scene = scene(rig.source);
     Arc::new(compile(scene, rig.nominal.clone(), rig.simulated.clone(), &terms).expect("sound"))
 }
