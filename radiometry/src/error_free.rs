@@ -221,10 +221,10 @@ mod tests {
             let error = (once.to_f64() - libm::cos(theta)).abs();
             assert!(error <= f64::EPSILON * once.to_f64().max(1e-3), "{theta}: {error:e}");
         }
-        // The double next to π/3 lies 1.072e-16 above it: 1/2 less √3/2 of that.
-        const ABOVE: f64 = 1.072_081_766_451_091e-16;
+        // The double next to π/3 lies so far above it: 1/2 less √3/2 of that.
+        let above = 1.072_081_766_451_091e-16;
         let rest = cosine(core::f64::consts::FRAC_PI_3).sub(DoubleDouble::from_f64(0.5)).to_f64();
-        let expected = -0.5 * 3.0_f64.sqrt() * ABOVE;
+        let expected = -0.5 * 3.0_f64.sqrt() * above;
         assert!((rest / expected - 1.0).abs() < 1e-14, "{rest:e}, not {expected:e}");
     }
 }
