@@ -177,3 +177,30 @@ fn a_simulated_device_is_there_until_it_is_stopped() {
     assert_eq!(said.out, "port\n");
     assert!(!bench.path("port").exists(), "the link stayed");
 }
+
+#[test]
+fn effects_are_explained_over_a_plan_and_chosen_by_name() {
+    let bench = Bench::of("lambertian");
+    let explain = |more: &[&str]| {
+        let words = ["explain", "scene.toml", "--plan", "plan.toml", "--json"];
+        bench.gonio(&[&words[..], more].concat())
+    };
+    let row = |document: &serde_json::Value, name: &str| {
+        let rows = document["effects"].as_array().unwrap();
+        rows.iter().find(|row| row["effect"] == name).cloned().unwrap_or_else(|| panic!("{name}"))
+    };
+    let said = explain(&[]).well().json();
+    // The whole footprint stays on an even patch: no influence at all.
+    let beam = row(&said, "finite-beam");
+    assert_eq!((&beam["included"], &beam["bound"]["value"]), (&false.into(), &0.0.into()));
+    let shot = row(&said, "shot-noise");
+    assert!(shot["included"] == true && shot["cost_ns"].is_number(), "{shot}");
+    assert!((said["region"]["theta_max_deg"].as_f64().unwrap() - 80.0).abs() < 1e-9, "{said}");
+    let forced = explain(&["--force", "finite-beam", "--without", "shot-noise"]).well().json();
+    assert_eq!(row(&forced, "finite-beam")["included"], true);
+    assert_eq!(row(&forced, "shot-noise")["included"], false);
+    explain(&["--without", "shot-nois"])
+        .refused(&["no effect is called", "did you mean shot-noise"]);
+    explain(&["--without", "saturation"]).refused(&["saturation", "part of what a reading is"]);
+    bench.gonio(&["explain", "plan.toml"]).refused(&["plan.toml", "is a plan, not a scene"]);
+}
