@@ -47,6 +47,16 @@ impl Optics for ByRays {
     }
 }
 
+/// What is before a beam.
+enum Before<'p> {
+    /// None of the patches.
+    Nothing,
+    /// One that fills it.
+    One(&'p Patch),
+    /// An outline, perhaps.
+    Outlines,
+}
+
 /// Over flat patches, which are all that there is to see.
 #[derive(Debug, Clone)]
 pub(crate) struct OverPatches {
@@ -99,21 +109,22 @@ impl OverPatches {
         }
     }
 
-    /// The patch that fills the beam, if one does, or none if nothing is in it.
-    fn filled_by(&self, axis: &Axis) -> Option<Option<&Patch>> {
-        let footprint = Footprint::on_plane(&self.beam, axis.spot, axis.direction)?;
-        let at = Ray::through(axis.spot, axis.direction)?.point.truncate();
-        let radius = footprint.radius_m();
-        let mut filling = None;
+    /// What the footprint lies on.
+    fn before(&self, axis: &Axis) -> Before<'_> {
+        let footprint = Footprint::on_plane(&self.beam, axis.spot, axis.direction);
+        let ray = Ray::through(axis.spot, axis.direction);
+        let (Some(footprint), Some(ray)) = (footprint, ray) else { return Before::Outlines };
+        let (at, radius) = (ray.point.truncate(), footprint.radius_m());
+        let mut before = Before::Nothing;
         for patch in &self.patches {
             if patch.boundary.distance(at) <= radius {
-                return None;
+                return Before::Outlines;
             }
             if patch.boundary.holds(at) {
-                filling = Some(patch);
+                before = Before::One(patch);
             }
         }
-        Some(filling)
+        before
     }
 
     fn across(&self, axis: &Axis) -> f64 {
@@ -137,13 +148,13 @@ impl OverPatches {
 
 impl Optics for OverPatches {
     fn radiance(&self, axis: &Axis) -> f64 {
-        match self.filled_by(axis) {
-            Some(None) => 0.0,
-            Some(Some(patch)) => match patch.uniform {
+        match self.before(axis) {
+            Before::Nothing => 0.0,
+            Before::One(patch) => match patch.uniform {
                 Some(radiance) => radiance,
                 None => self.inside.radiance(axis),
             },
-            None => self.across(axis),
+            Before::Outlines => self.across(axis),
         }
     }
 

@@ -147,7 +147,7 @@ fn over_patches(setting: &Setting<'_>, beam: &Beam, patches: &[Patch]) -> (f64, 
         let (field, rays) = (of_patch(setting, patch), inside_rays(setting, beam, patch.is_round));
         let optics = ByRays::new(Arc::clone(&field), *beam, DEGREES[1]);
         bound = largest(setting, &optics, &PointSampled(field), &rays);
-        fact = "radiance goes with direction within the beam".to_owned();
+        fact = String::from("radiance goes with direction within the beam");
     }
     if let Some(first) = near.first() {
         bound = bound.max(largest_across(setting, beam, patches));
