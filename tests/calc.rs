@@ -212,6 +212,36 @@ fn the_largest_and_smallest_doubles_give_a_number_or_a_sentence() {
 }
 
 #[test]
+fn several_bodies_hide_what_any_of_them_hides() {
+    let seen = |bodies: Value| {
+        let mut inputs = json!({
+            "point": [0, 0, 0], "normal": [0, 0, 1],
+            "source": {"kind": "sphere", "center": [0, 0, 2], "radius": 1},
+        });
+        for (key, value) in bodies.as_object().expect("an object") {
+            inputs[key] = value.clone();
+        }
+        ask("occluded-projected-solid-angle", &inputs)
+    };
+    // A knife edge through the middle, the same again nearer, and a ball far aside.
+    let edge = |z: f64| json!({"kind": "half-plane", "x_max": 0, "z": z});
+    let aside = json!({"kind": "sphere", "center": [9, 0, 1], "radius": 0.1});
+    for bodies in [
+        json!({"occluder": edge(0.5)}),
+        json!({"occluders": [edge(0.5)]}),
+        json!({"occluders": [edge(0.5), aside, edge(0.25)]}),
+    ] {
+        let answer = seen(bodies);
+        let error = (answer["value"].as_f64().expect("a value") - PI / 8.0).abs();
+        assert!(error <= answer["error_bound"].as_f64().expect("a bound"), "{answer}");
+    }
+    let both = seen(json!({"occluder": edge(0.5), "occluders": [edge(0.5)]}));
+    for refused in [both, seen(json!({})), seen(json!({"occluders": [{"kind": "cube"}]}))] {
+        assert!(refused["error"].is_string(), "{refused}");
+    }
+}
+
+#[test]
 fn light_has_the_values_of_the_closed_forms() {
     let near = |quantity: &str, inputs: Value, expected: &[f64]| {
         let answer = ask(quantity, &inputs);

@@ -215,10 +215,11 @@ pub(super) const QUANTITIES: &[Quantity] = &[
             POINT,
             NORMAL,
             Input::new("source", "{kind: disk | sphere | polygon, center, radius | vertices}"),
-            Input::new(
+            Input::optional(
                 "occluder",
                 "{kind: half-plane | disk | sphere | polygon, x_max, z | center, radius | vertices}",
             ),
+            Input::optional("occluders", "list of such bodies, instead of one"),
             Input::optional("relative_tolerance", "default 1e-10"),
         ],
         unit: SR,
@@ -227,10 +228,9 @@ pub(super) const QUANTITIES: &[Quantity] = &[
                   --occluder {\"kind\":\"half-plane\",\"x_max\":0,\"z\":2}",
         rounding: Rounding::Stated,
         compute: |inputs| {
-            let (source, occluder) =
-                (source(inputs.object("source")?)?, occluder(inputs.object("occluder")?)?);
+            let (source, occluders) = (source(inputs.object("source")?)?, occluders(inputs)?);
             let tolerance = tolerance(inputs)?;
-            Ok(projected::occluded(&receiver(inputs)?, &source, &occluder, tolerance)?.into())
+            Ok(projected::occluded_by(&receiver(inputs)?, &source, &occluders, tolerance)?.into())
         },
     },
 ];
@@ -273,6 +273,17 @@ pub(super) fn source(body: Inputs<'_>) -> Result<Source, Refusal> {
         }
         other => Err(unknown_kind("source", other, "disk, sphere or polygon")),
     }
+}
+
+/// One body or a list of them, not both.
+fn occluders(inputs: Inputs<'_>) -> Result<Vec<Occluder>, Refusal> {
+    if !inputs.has("occluders") {
+        return Ok(vec![occluder(inputs.object("occluder")?)?]);
+    }
+    if inputs.has("occluder") {
+        return Err(Refusal::new("occluder and occluders are both given, expected one of them"));
+    }
+    inputs.objects("occluders")?.into_iter().map(occluder).collect()
 }
 
 pub(super) fn occluder(body: Inputs<'_>) -> Result<Occluder, Refusal> {
