@@ -188,3 +188,25 @@ fn what_has_no_meaning_is_refused() {
         Err(DomainError::Interpenetrating.into())
     );
 }
+
+/// The outline crosses the edge where its parameter begins and ends, to a rounding either way.
+#[test]
+fn a_knife_edge_through_the_middle_hides_half_from_anywhere_below_it() {
+    let edge = Occluder::HalfPlane(HalfPlane::new(0.0, 0.5).unwrap());
+    let center = DVec3::new(0.0, 0.0, 1.0);
+    for i in 0..1000 {
+        let y = -0.03 + 6e-5 * f64::from(i);
+        let receiver = Receiver::new(DVec3::new(0.0, y, 0.0), DVec3::Z).unwrap();
+        let ball = Sphere::new(center, 0.02).unwrap();
+        let plate = Disk::new(center, DVec3::Z, 0.02).unwrap();
+        let wholes = [
+            projected::sphere(&receiver, &ball).unwrap().sr(),
+            projected::disk(&receiver, &plate).unwrap().sr(),
+        ];
+        for (source, whole) in [Source::Sphere(ball), Source::Disk(plate)].iter().zip(wholes) {
+            let seen = projected::occluded(&receiver, source, &edge, Tolerance::default()).unwrap();
+            let error = (seen.value - whole / 2.0).abs();
+            assert!(error <= seen.error_bound + 1e-14 * whole, "{source:?} from y = {y}: {seen:?}");
+        }
+    }
+}

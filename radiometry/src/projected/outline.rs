@@ -188,9 +188,10 @@ impl Curve {
             return Vec::new();
         }
         let speed = self.sine.abs().max_element() / self.base.abs().max_element();
-        let search = Search { along, close: 1e-8 / speed.max(1.0) };
-        let mut found = Vec::new();
         let ends = [self.start, self.start + self.turn];
+        let seam = self.is_closed().then_some(ends);
+        let search = Search { along, close: 1e-8 / speed.max(1.0), seam };
+        let mut found = Vec::new();
         if let Some(turning) = along.turning_point() {
             search.run_between(turning, ends, &mut found);
         } else {
@@ -237,17 +238,29 @@ const HALVINGS_MAX: u32 = 1000;
 struct Search {
     along: Along,
     close: f64,
+    /// Where a closed curve begins and ends: one point.
+    seam: Option<[f64; 2]>,
 }
 
 impl Search {
+    /// A parameter with the function there. It has one value where a closed curve meets itself, and
+    /// is never zero: so that a crossing at the seam, or where two intervals meet, is found once.
+    fn at(&self, t: f64) -> (f64, f64) {
+        let place = match self.seam {
+            Some([start, end]) if t >= end => start,
+            _ => t,
+        };
+        let (value, _) = self.along.value_and_slope(place);
+        (t, if value == 0.0 { f64::MIN_POSITIVE } else { value })
+    }
+
     /// Looks where the function rises or falls throughout: between the turning points, which are half a
     /// turn apart.
     fn run_between(&self, turning: f64, [start, end]: [f64; 2], found: &mut Vec<f64>) {
-        let at = |t: f64| (t, self.along.value_and_slope(t).0);
-        let mut from = at(start);
+        let mut from = self.at(start);
         let turns = (-2..=3).map(|half| f64::from(half).mul_add(PI, turning));
         for t in turns.filter(|t| start < *t && *t < end).chain([end]) {
-            let to = at(t);
+            let to = self.at(t);
             found.extend(self.root(from, to));
             from = to;
         }
@@ -265,8 +278,7 @@ impl Search {
             return;
         }
         if slope.abs() > bend * half {
-            let at = |t: f64| (t, self.along.value_and_slope(t).0);
-            found.extend(self.root(at(from), at(to)));
+            found.extend(self.root(self.at(from), self.at(to)));
         } else if half > self.close && *halvings_left > 0 {
             *halvings_left -= 1;
             self.run([from, middle], halvings_left, found);
@@ -277,14 +289,14 @@ impl Search {
     /// The crossing in an interval where the function rises or falls throughout, if there is one: by
     /// Newton's method, by halving where that leaves the bracket.
     fn root(&self, (from, sign): (f64, f64), (to, other): (f64, f64)) -> Option<f64> {
-        if sign * other > 0.0 {
+        if (sign > 0.0) == (other > 0.0) {
             return None;
         }
         let (mut from, mut to) = (from, to);
         let mut t = f64::midpoint(from, to);
         for _ in 0..80 {
             let (value, slope) = self.along.value_and_slope(t);
-            if value * sign > 0.0 {
+            if (value > 0.0) == (sign > 0.0) {
                 from = t;
             } else {
                 to = t;
