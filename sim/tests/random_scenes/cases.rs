@@ -1,0 +1,235 @@
+//! Random scenes, each with one effect of light whose influence is spread over eight decades, and the
+//! search for its true influence.
+
+use core::f64::consts::PI;
+use std::fmt::Write as _;
+
+use glam::DVec3;
+use sim::{Axis, Compiled, Nominal, Quantity, Ray, Region, Scene, Simulated, Terms, compile};
+use spanned_toml::{Document, Source};
+
+/// A scene and the effect that is weighed in it.
+pub(crate) struct Case {
+    pub(crate) effect: &'static str,
+    pub(crate) scene: String,
+    /// Axes at which the effect is likely to be the strongest: x and y in mm, θ and φ in radians.
+    likely: Vec<[f64; 4]>,
+    has_beam: bool,
+}
+
+/// What was stated and what was found.
+pub(crate) struct Weighed {
+    pub(crate) bound: f64,
+    pub(crate) found: f64,
+}
+
+/// `SplitMix64` (Steele, Lea, Flood 2014).
+pub(crate) struct Dice(pub(crate) u64);
+
+impl Dice {
+    fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Evenly in the logarithm.
+    fn decades(&mut self, low: f64, high: f64) -> f64 {
+        10.0_f64.powf(self.uniform(low, high))
+    }
+}
+
+const HALF_MM: f64 = 10.0;
+const THETA_MAX: f64 = 1.0;
+const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-50, 50]\n\
+                     y_mm = [-50, 50]\n";
+
+/// The `i`-th: kinds take turns.
+pub(crate) fn draw(i: u64) -> Case {
+    let mut dice = Dice(i * 7919);
+    match i % 6 {
+        0 => weak_lamp(&mut dice),
+        1 | 2 => shadow(&mut dice),
+        3 => window(&mut dice),
+        4 => lamp_in_beam(&mut dice),
+        _ => finite_beam(&mut dice),
+    }
+}
+
+fn case(effect: &'static str, scene: String) -> Case {
+    Case { effect, scene, likely: Vec::new(), has_beam: false }
+}
+
+/// Beside a strong one.
+fn weak_lamp(dice: &mut Dice) -> Case {
+    let mut scene = PANEL.to_owned();
+    for radiance in [100.0, 100.0 * dice.decades(-8.0, 0.0)] {
+        let (x, y) = (dice.uniform(-100.0, 100.0), dice.uniform(-100.0, 100.0));
+        let (z, r) = (dice.uniform(350.0, 600.0), dice.uniform(5.0, 40.0));
+        // Apart from each other, whatever is drawn.
+        let y = if radiance < 100.0 { y + 300.0 } else { y };
+        let _ = write!(
+            scene,
+            "[[lamp]]\nkind = \"sphere\"\ncentre_mm = [{x}, {y}, {z}]\nradius_mm = {r}\n\
+             radiance_w_per_m2_sr = {radiance}\n"
+        );
+    }
+    case("lamp[1]", scene)
+}
+
+/// Of a ball before a disk or a ball, from next to nothing to all of it.
+fn shadow(dice: &mut Dice) -> Case {
+    let lamp = DVec3::new(dice.uniform(-80.0, 80.0), dice.uniform(-80.0, 80.0), 900.0);
+    let (radius, height) = (dice.uniform(10.0, 40.0), dice.uniform(400.0, 700.0));
+    let place = DVec3::new(dice.uniform(-8.0, 8.0), dice.uniform(-8.0, 8.0), 0.0);
+    let part = height / lamp.z;
+    let centre = place + (lamp - place) * part;
+    let ball = radius * part * dice.decades(-4.0, 0.2);
+    let kind = if dice.uniform(0.0, 1.0) < 0.5 {
+        "kind = \"disk\"\naxis = [0, 0, -1]"
+    } else {
+        "kind = \"sphere\""
+    };
+    let scene = format!(
+        "{PANEL}[[lamp]]\n{kind}\ncentre_mm = [{}, {}, {}]\nradius_mm = {radius}\n\
+         radiance_w_per_m2_sr = 100\n\
+         [[occluder]]\nkind = \"sphere\"\ncentre_mm = [{}, {}, {}]\nradius_mm = {ball}\n",
+        lamp.x, lamp.y, lamp.z, centre.x, centre.y, centre.z
+    );
+    // Where the ball's middle is before some place of the lamp.
+    let mut likely = vec![[place.x, place.y, 0.0, 0.0]];
+    for _ in 0..60 {
+        let (along, turn) = (radius * dice.uniform(0.0, 1.0).sqrt(), dice.uniform(-PI, PI));
+        let shining = lamp + DVec3::new(along * turn.cos(), along * turn.sin(), 0.0);
+        let away = centre - shining;
+        let foot = shining - away * (shining.z / away.z);
+        likely.push([foot.x, foot.y, 0.0, 0.0]);
+    }
+    Case { likely, ..case("shadow[0]", scene) }
+}
+
+fn window(dice: &mut Dice) -> Case {
+    let (index, absorption) = (1.0 + dice.decades(-5.0, -0.1), dice.decades(-9.0, -1.0));
+    let (thickness, exponent) = (dice.uniform(1.0, 6.0), dice.uniform(0.0, 4.0));
+    let scene = format!(
+        "[[emitter]]\nkind = \"cosine-power\"\nexponent = {exponent}\nx_mm = [-90, 90]\n\
+         y_mm = [-90, 90]\nradiance_w_per_m2_sr = 10\n\
+         [[window]]\nz_mm = 5\nthickness_mm = {thickness}\nindex = {index}\n\
+         absorption_per_mm = {absorption}\nbelongs_to = \"beam\"\n"
+    );
+    let likely = (0..8).map(|k| [0.0, 0.0, THETA_MAX, f64::from(k) - PI]).collect();
+    Case { likely, ..case("window[0]", scene) }
+}
+
+/// Nearly as bright as what it hides.
+fn lamp_in_beam(dice: &mut Dice) -> Case {
+    let radiance = 10.0 * (1.0 + dice.decades(-8.0, 0.5));
+    let (x, y, z) = (dice.uniform(-60.0, 60.0), dice.uniform(-60.0, 60.0), 150.0);
+    let radius = dice.uniform(3.0, 20.0);
+    let scene = format!(
+        "[[emitter]]\nkind = \"lambertian\"\nx_mm = [-90, 90]\ny_mm = [-90, 90]\n\
+         radiance_w_per_m2_sr = 10\n\
+         [[lamp]]\nkind = \"sphere\"\ncentre_mm = [{x}, {y}, {z}]\nradius_mm = {radius}\n\
+         radiance_w_per_m2_sr = {radiance}\n"
+    );
+    let away = DVec3::new(x, y, z);
+    let (theta, phi) = ((away.truncate().length() / z).atan(), y.atan2(x));
+    Case { likely: vec![[0.0, 0.0, theta, phi]], ..case("lamp-in-beam[0]", scene) }
+}
+
+/// Over a lobe that is hardly one, or is steep; and near an outline.
+fn finite_beam(dice: &mut Dice) -> Case {
+    let exponent = dice.decades(-6.0, 2.0);
+    let half = if dice.uniform(0.0, 1.0) < 0.5 { 90.0 } else { dice.uniform(11.0, 30.0) };
+    let scene = format!(
+        "[[emitter]]\nkind = \"cosine-power\"\nexponent = {exponent}\nx_mm = [-{half}, {half}]\n\
+         y_mm = [-{half}, {half}]\nradiance_w_per_m2_sr = 10\n"
+    );
+    let mut likely = Vec::new();
+    for corner in [[-HALF_MM, 0.0], [HALF_MM, HALF_MM], [0.0, -HALF_MM], [HALF_MM, 0.0]] {
+        likely.extend((0..8).map(|k| [corner[0], corner[1], THETA_MAX, f64::from(k) * PI / 4.0]));
+    }
+    Case { likely, has_beam: true, ..case("finite-beam", scene) }
+}
+
+pub(crate) fn read(text: &str) -> Scene {
+    let document = Document::parse(Source::new("scene.toml", text)).unwrap();
+    let load = |name: &str| Err(format!("{name}: no such file"));
+    Scene::read(&document, Quantity::Radiance, &load).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+impl Case {
+    /// With the effect forced in, and the same rig without it.
+    fn compiled(&self, nominal: &Nominal) -> (Compiled, Compiled) {
+        let side = (-HALF_MM * 1e-3, HALF_MM * 1e-3);
+        let region = Region { x_m: side, y_m: side, theta_max_rad: THETA_MAX };
+        let mut terms = Terms { region: Some(region), tolerance: Some(1e-9), ..Terms::default() };
+        if !self.has_beam {
+            terms.without.push("finite-beam".into());
+        }
+        let mut less = terms.clone();
+        terms.force.push(self.effect.into());
+        less.without.push(self.effect.into());
+        let compiled = |terms| {
+            compile(read(&self.scene), nominal.clone(), Simulated::default(), terms)
+                .unwrap_or_else(|e| panic!("{e}\n{}", self.scene))
+        };
+        (compiled(&terms), compiled(&less))
+    }
+
+    /// The bound of its row, and the largest influence that a search finds.
+    pub(crate) fn weighed(&self, nominal: &Nominal, seed: u64) -> Weighed {
+        let (with, without) = self.compiled(nominal);
+        let row = with.effects().iter().find(|row| row.name == self.effect).expect("a row");
+        assert!(row.included && row.cause.is_some(), "{row:?}");
+        let bound = row.bound.expect("a bound").value;
+        let influence = |at: &[f64; 4]| {
+            let ray = Ray::new(at[0] * 1e-3, at[1] * 1e-3, at[2], at[3]);
+            let axis = Axis { spot: ray.point, direction: ray.direction };
+            let (a, b) = (with.seen_radiance(&axis), without.seen_radiance(&axis));
+            let reading = a.max(b);
+            if reading > 0.0 { (a - b).abs() / reading } else { 0.0 }
+        };
+        Weighed { bound, found: self.search(&influence, seed) }
+    }
+
+    /// At the likely places, at random ones, and uphill from the best of them.
+    fn search(&self, influence: &dyn Fn(&[f64; 4]) -> f64, seed: u64) -> f64 {
+        let mut dice = Dice(seed);
+        let within = |at: [f64; 4]| {
+            let side = |x: f64| x.clamp(-HALF_MM, HALF_MM);
+            [side(at[0]), side(at[1]), at[2].clamp(0.0, THETA_MAX), at[3]]
+        };
+        let mut tried: Vec<(f64, [f64; 4])> = Vec::new();
+        let random = (0..400).map(|_| {
+            let (x, y) = (dice.uniform(-HALF_MM, HALF_MM), dice.uniform(-HALF_MM, HALF_MM));
+            [x, y, THETA_MAX * dice.uniform(0.0, 1.0).sqrt(), dice.uniform(-PI, PI)]
+        });
+        for at in self.likely.iter().copied().map(within).chain(random) {
+            tried.push((influence(&at), at));
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut best = tried[0];
+        for (mut value, mut at) in tried.into_iter().take(3) {
+            let mut step = 0.2;
+            for _ in 0..120 {
+                let mut next = at;
+                for (k, span) in [2.0 * HALF_MM, 2.0 * HALF_MM, THETA_MAX, PI].iter().enumerate() {
+                    next[k] += step * span * dice.uniform(-1.0, 1.0);
+                }
+                let next = within(next);
+                let found = influence(&next);
+                if found > value {
+                    (value, at) = (found, next);
+                } else {
+                    step = (step * 0.93).max(1e-6);
+                }
+            }
+            if value > best.0 {
+                best = (value, at);
+            }
+        }
+        best.0
+    }
+}
