@@ -7,6 +7,7 @@
 //! `cargo run --release -p benches --bin coverage -- --doc docs/measured.md --date 2026-11-22`.
 
 mod arguments;
+pub mod bars;
 mod cases;
 mod counted;
 mod dice;
