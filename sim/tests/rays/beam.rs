@@ -1,7 +1,8 @@
 //! The detector by brute force: a ray from a place of the pupil through a place of the spot, again and
 //! again, each with the throughput of its two area elements.
 
-use glam::DVec3;
+use core::f64::consts::PI;
+
 use sim::{Axis, NominalDetector};
 
 use crate::dice::Dice;
@@ -52,22 +53,47 @@ pub(crate) fn reading(
     rays: u32,
     seed: u64,
 ) -> Mean {
+    let mut sums = Sums::default();
+    sample(world, detector, axis, (rays, seed), |value, weight| sums.add(value, weight));
+    sums.mean()
+}
+
+/// The flux through pupil and spot: the integral over both areas.
+pub(crate) fn flux(
+    world: &World,
+    detector: &NominalDetector,
+    axis: &Axis,
+    rays: u32,
+    seed: u64,
+) -> Mean {
+    let area = |radius: f64| PI * radius * radius;
+    let areas = area(detector.pupil_radius_m) * area(detector.spot_radius_m);
+    let mut sums = Sums::default();
+    sample(world, detector, axis, (rays, seed), |value, weight| {
+        sums.add(value * weight * areas, 1.0);
+    });
+    sums.mean()
+}
+
+/// Radiances of random rays, each with the throughput of a unit of both areas.
+fn sample(
+    world: &World,
+    detector: &NominalDetector,
+    axis: &Axis,
+    (rays, seed): (u32, u64),
+    mut each: impl FnMut(f64, f64),
+) {
     let mut dice = Dice(seed);
     let (u, v) = axis.direction.any_orthonormal_pair();
-    let mut across = |radius: f64| {
+    let across = |dice: &mut Dice, radius: f64| {
         let at = dice.in_disk() * radius;
         u * at.x + v * at.y
     };
-    let ends: Vec<(DVec3, DVec3)> = (0..rays)
-        .map(|_| {
-            let spot = axis.spot + across(detector.spot_radius_m);
-            let pupil =
-                axis.spot + axis.direction * detector.distance_m + across(detector.pupil_radius_m);
-            (spot, pupil)
-        })
-        .collect();
-    let mut sums = Sums::default();
-    for (spot, pupil) in ends {
+    for _ in 0..rays {
+        let spot = axis.spot + across(&mut dice, detector.spot_radius_m);
+        let pupil = axis.spot
+            + axis.direction * detector.distance_m
+            + across(&mut dice, detector.pupil_radius_m);
         let along = spot - pupil;
         let direction = along.normalize();
         // dG = cos θ cos θ' dA dA' / r².
@@ -75,9 +101,8 @@ pub(crate) fn reading(
         // A pupil below the plane sees nothing of the sample.
         let is_above = pupil.z > 0.0 && direction.z < 0.0;
         let value = if is_above { world.look(pupil, direction, &mut dice) } else { 0.0 };
-        sums.add(value, weight);
+        each(value, weight);
     }
-    sums.mean()
 }
 
 /// The radiance along the axis alone, a tenth of a millimetre above its spot.

@@ -10,6 +10,7 @@ mod bench;
 
 mod beam;
 mod beams;
+mod conserved;
 mod dice;
 mod form;
 mod glass;
