@@ -43,7 +43,7 @@ const BALL: &str = "[[occluder]]\nkind = \"sphere\"\ncentre_mm = [30, 0, 100]\nr
 const WINDOW: &str = "[[window]]\nz_mm = 20\nthickness_mm = 3\nindex = 1.5\n\
                       absorption_per_mm = 0.001\nbelongs_to = \"beam\"\n";
 const WARMING: &str = "[source.warm_up]\namplitude_relative = -0.05\ntime_constant_s = 600\n";
-const FLICKERING: &str = "[source.mains_flicker]\nfrequency_hz = 100\ndepth_relative = 0.1\n";
+const FLICKERING: &str = "[source.mains_flicker]\nfrequency_hz = 97\ndepth_relative = 0.1\n";
 
 /// Tolerates nothing; the beam and the noise that every rig has are in where they are asked for.
 pub(crate) fn terms(effect: &str) -> Terms {
@@ -51,7 +51,8 @@ pub(crate) fn terms(effect: &str) -> Terms {
     let without = others.map(str::to_owned).collect();
     let side = (-0.01, 0.01);
     let region = Some(Region { x_m: side, y_m: side, theta_max_rad: 1.0 });
-    Terms { region, tolerance: Some(1e-4), without, ..Terms::default() }
+    let force = if effect.is_empty() { Vec::new() } else { vec![effect.to_owned()] };
+    Terms { region, tolerance: Some(1e-4), force, without, ..Terms::default() }
 }
 
 fn scene(text: &str) -> Result<Scene, Unmeasured> {
