@@ -177,6 +177,11 @@ fn rig() -> Nominal {
         u_homing: 0.0,
         u_readback: 0.0,
     };
+    let gain = |(name, full_scale_a): (&str, f64)| NominalGain {
+        name: name.to_owned(),
+        full_scale_a,
+        u_relative: 0.0,
+    };
     Nominal {
         quantity: Quantity::Radiance,
         axes: [
@@ -195,7 +200,7 @@ fn rig() -> Nominal {
             responsivity_a_per_w: 0.2,
             u_responsivity_relative: 0.0,
             read_noise_a: 0.0,
-            gains: vec![NominalGain { name: "1 uA".into(), full_scale_a: 1e-6, u_relative: 0.0 }],
+            gains: [("1 uA", 1e-6), ("10 uA", 1e-5)].map(gain).to_vec(),
             adc_bits: 24,
             adc_rate_hz: 2000,
         },
