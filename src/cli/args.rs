@@ -191,6 +191,10 @@ pub(crate) struct FitArgs {
     /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all.
     #[arg(long, value_name = "U")]
     pub(crate) u_relative: Option<f64>,
+    /// For a CSV: the rig whose detector read it (a file, or "simulated"), for its beam's width.
+    /// Default: a sample is the radiance along its ray.
+    #[arg(long, value_name = "RIG")]
+    pub(crate) rig: Option<PathBuf>,
     /// Where to write fit.json. Default: the run's folder; of a CSV it is not written.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

@@ -4,12 +4,14 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{BasisSpec, Region};
+use fit::{BasisSpec, Optics, Region};
 
 use super::args::FitArgs;
 use super::failure::{Failure, Outcome};
+use super::inputs::Inputs;
 use super::output::{note, say, write_out};
 use super::results::{Results, read_run};
+use super::setup::rig_at;
 use super::summary::field_rows;
 use super::text::{row, table};
 use crate::export::{
@@ -47,6 +49,12 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         return Err(Failure::with_help(
             "--u-relative: a run's samples have uncertainties of their own",
             "leave it out; it is for a CSV without a column of uncertainties",
+        ));
+    }
+    if args.rig.is_some() {
+        return Err(Failure::with_help(
+            "--rig: a run brings its rig along",
+            "leave it out; it is for a CSV, which has none",
         ));
     }
     let (setup, _, readings) = read_run(&args.source)?;
@@ -89,7 +97,8 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         position_degree: args.position_degree.unwrap_or(POSITION_DEGREE),
     };
     let samples = input.fit_samples(args.u_relative);
-    let fit = fit::fit(&samples, &region, basis, &[])
+    let optics = args.rig.as_deref().map(optics_of).transpose()?;
+    let fit = fit::fit_seen(&samples, &region, basis, &[], optics.as_ref())
         .map_err(|error| Failure::with_help(format!("{shown}: {error}"), FIT_HELP))?;
     let notes = [note_on_u(&input, args.u_relative)];
     let file = FitFile {
@@ -120,6 +129,13 @@ fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
                 .to_owned()
         }
     }
+}
+
+/// The beam of a rig's detector; where the sample ends a CSV does not say.
+fn optics_of(path: &Path) -> Result<Optics, Failure> {
+    let rig = rig_at(&mut Inputs::from_disk(), path)?;
+    let beam = rig.detector.beam().map_err(|error| Failure::start(error.to_string()))?;
+    Ok(Optics { beam, outline: None })
 }
 
 /// The rectangle and the cone that hold all samples.

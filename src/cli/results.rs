@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{BasisSpec, FitError, Region};
+use fit::{BasisSpec, FitError, Optics, Region};
 
 use super::failure::Failure;
 use super::folder::JOURNAL;
@@ -42,14 +42,17 @@ impl Results {
     /// possible is a result too, since the samples stand.
     pub(crate) fn of(setup: &Setup, spec: FitSpec, readings: &[Reading]) -> Result<Self, Failure> {
         let mut calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
-        let (region, basis) = (fit_region(setup), basis(spec));
-        let fitted = calibrated.fit(&region, basis);
+        let (region, basis, optics) = (fit_region(setup), basis(spec), optics(setup));
+        let fitted = calibrated.fit(&region, basis, optics.as_ref());
         if let Ok(fitted) = &fitted {
-            calibrated.restate_from(&fitted.fit);
+            calibrated.restate_from(&fitted.fit, optics.as_ref());
+        }
+        if let Some(optics) = &optics {
+            calibrated.flag_off_sample(optics);
         }
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
-        let accuracy = accuracy(&calibrated, &region, basis);
+        let accuracy = accuracy(&calibrated, &region, basis, optics.as_ref());
         Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy })
     }
 
@@ -175,6 +178,12 @@ pub(crate) fn fit_region(setup: &Setup) -> Region {
     Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad }
 }
 
+/// What the rig's detector sees of the plan's sample.
+pub(crate) fn optics(setup: &Setup) -> Option<Optics> {
+    let beam = setup.rig.detector.beam().ok()?;
+    Some(Optics { beam, outline: setup.plan.sample })
+}
+
 /// The plan's basis as the fit takes it.
 pub(crate) fn basis(spec: FitSpec) -> BasisSpec {
     BasisSpec { angular_degree: spec.angular_degree, position_degree: spec.position_degree }
@@ -206,7 +215,12 @@ fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Op
 /// Fits of the first readings, ever more of them: half as many for two points further back.
 /// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
 /// of it is determined by its noise and its truncation alone, and is no point of the curve.
-fn accuracy(calibrated: &Calibrated, region: &Region, basis: BasisSpec) -> Vec<AccuracyPoint> {
+fn accuracy(
+    calibrated: &Calibrated,
+    region: &Region,
+    basis: BasisSpec,
+    optics: Option<&Optics>,
+) -> Vec<AccuracyPoint> {
     let total = calibrated.samples.len();
     let mut counts: Vec<usize> = (0..ACCURACY_POINTS)
         .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
@@ -222,7 +236,7 @@ fn accuracy(calibrated: &Calibrated, region: &Region, basis: BasisSpec) -> Vec<A
     let point = |count: usize| {
         let known = calibrated.first(count);
         let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
-        let fit = known.fit(region, basis).ok()?.fit;
+        let fit = known.fit(region, basis, optics).ok()?.fit;
         (fit.condition() <= ACCURACY_CONDITION_MAX).then(|| AccuracyPoint {
             rig_s: last.fold(0.0, f64::max),
             readings: count as u64,

@@ -3,7 +3,7 @@
 
 use super::acquire::Pace;
 use super::failure::Failure;
-use super::results::{Results, basis, fit_region, targets_planned};
+use super::results::{Results, basis, fit_region, optics, targets_planned};
 use super::setup::Setup;
 use super::text::percent;
 use crate::rig::calibration::{Fitted, calibrate};
@@ -38,6 +38,7 @@ struct Target {
     rig: Rig,
     region: fit::Region,
     basis: fit::BasisSpec,
+    optics: Option<fit::Optics>,
     asked: f64,
     planned: usize,
     readings: Vec<Reading>,
@@ -53,6 +54,7 @@ impl Target {
             rig: setup.rig.clone(),
             region: fit_region(setup),
             basis,
+            optics: optics(setup),
             asked,
             planned: targets_planned(setup),
             targets: before.iter().filter(|reading| is_target(reading)).count(),
@@ -69,7 +71,8 @@ impl Target {
             return None;
         }
         self.next = grown(self.targets);
-        let fitted = calibrate(&self.rig, &self.readings).ok()?.fit(&self.region, self.basis);
+        let calibrated = calibrate(&self.rig, &self.readings).ok()?;
+        let fitted = calibrated.fit(&self.region, self.basis, self.optics.as_ref());
         let u = u_relative(&fitted.ok()?);
         (u <= self.asked).then(|| {
             let (asked, targets, planned) = (percent(self.asked), self.targets, self.planned);

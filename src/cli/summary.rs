@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fit::Fit;
+use fit::{BeamRows, Fit};
 use serde_json::{Value, json};
 
 use super::results::{Results, targets_planned};
@@ -152,6 +152,20 @@ impl Summary<'_> {
     }
 }
 
+/// How the fit's rows stand for the beam.
+fn in_words(beam: BeamRows) -> String {
+    let BeamRows { point, averaged, cut, off_sample, .. } = beam;
+    let kinds = [
+        (averaged, "averaged over the beam"),
+        (cut, "over the part of it that meets the sample"),
+        (off_sample, "beside the sample"),
+        (point, "along its axis alone"),
+    ];
+    let said = kinds.into_iter().filter(|(count, _)| *count > 0);
+    let said: Vec<String> = said.map(|(count, how)| format!("{count} {how}")).collect();
+    format!("readings {}", said.join(", "))
+}
+
 /// What a fit says of its field, whoever asks.
 pub(crate) fn field_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
     let [radiance_unit, exitance_unit, flux_unit] = quantity.units();
@@ -163,6 +177,7 @@ pub(crate) fn field_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
         rows.push(row(&name, format!("{} of the exitance", percent(fraction))));
     }
     rows.push(row("flux", with_uncertainty(flux.value, flux.u, flux_unit)));
+    rows.extend(fit.beam().map(|beam| row("beam", in_words(beam))));
     let excess = fit.excess_rms();
     if excess > 0.0 {
         // What the fit's functions can't follow, or a source that wavers.

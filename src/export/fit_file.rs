@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use fit::{Estimate, Fit};
+use fit::{BeamRows, Estimate, Fit};
 use serde_json::{Map, Value, json};
 
 use crate::rig::Quantity;
@@ -101,6 +101,7 @@ impl FitFile<'_> {
         put("excess_rms", json!(fit.excess_rms()));
         put("chi2", json!(fit.chi2()));
         put("dof", json!(fit.dof()));
+        put("beam", fit.beam().map_or(Value::Null, beam));
         put("n_used", json!(fit.n_used()));
         put("n_flagged", json!(self.n_flagged));
         put("n_excluded", json!(self.n_excluded));
@@ -156,6 +157,19 @@ impl FitFile<'_> {
             "radiance_error_rms_relative": truth.radiance_error_rms_relative,
         })
     }
+}
+
+/// How many readings count as what, and by how much of its own independent u the averages'
+/// quadrature may shift a derived quantity.
+fn beam(rows: BeamRows) -> Value {
+    json!({
+        "point": rows.point,
+        "averaged": rows.averaged,
+        "cut": rows.cut,
+        "off_sample": rows.off_sample,
+        "directions": rows.directions,
+        "quadrature_u": rows.quadrature,
+    })
 }
 
 fn estimate(Estimate { value, u, u_independent }: Estimate) -> Value {

@@ -156,7 +156,7 @@ impl InputSamples {
     /// it, relative to the root mean square of all values: a u relative to each value would favour
     /// those that came out low. With neither, the fit estimates one from its residuals.
     pub fn fit_samples(&self, u_relative: Option<f64>) -> Vec<fit::Sample> {
-        let used = || self.samples.iter().filter(|sample| !sample.flags.excludes_from_fit());
+        let used = || self.samples.iter().filter(|sample| is_used(sample.flags));
         let squares: f64 = used().map(|sample| sample.value * sample.value).sum();
         let mean_square = squares / used().count().max(1) as f64;
         let fallback = match u_relative {
@@ -182,6 +182,11 @@ impl InputSamples {
     pub fn flagged(&self) -> usize {
         self.samples.iter().filter(|sample| !sample.flags.is_empty()).count()
     }
+}
+
+/// Where the sample that a beam reached beyond ends, a file doesn't say.
+fn is_used(flags: Flags) -> bool {
+    !flags.excludes_from_fit() && !flags.contains(Flag::OffSample)
 }
 
 struct Table<'b> {

@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use fit::Outline;
 use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
@@ -14,7 +15,10 @@ use super::{
 use crate::rig::Pose;
 
 /// A sample is smaller than this from its origin.
-const PLACE_MM: Bounds = Bounds::between(-10_000.0, 10_000.0);
+const PLACE_MAX_MM: f64 = 10_000.0;
+const PLACE_MM: Bounds = Bounds::between(-PLACE_MAX_MM, PLACE_MAX_MM);
+/// A region's corner on the sample's outline is on the sample, whatever a division rounds to.
+const INWARDS: f64 = 1.0 - 1e-12;
 const THETA_DEG: Bounds = Bounds::between(0.0, 90.0);
 /// An azimuth may be written in any turn that a person would write.
 const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
@@ -44,13 +48,14 @@ impl Plan {
     ///
     /// At the top: `name`, what to call its runs · `rig`, a rig file beside the plan or
     /// `"simulated"` · `scene`, a scene file beside the plan. Then the tables `[region]`,
-    /// `[schedule]`, `[dwell]`, `[dark]`, `[fit]`, and if wanted `[reference]`, `[warm_up]` and
-    /// `[stop]`.
+    /// `[schedule]`, `[dwell]`, `[dark]`, `[fit]`, and if wanted `[sample]`, `[reference]`,
+    /// `[warm_up]` and `[stop]`.
     pub fn read(document: Document) -> Result<Self, Problem> {
         let root = document.root();
         let text = |key: &str| root.text(key).map(|text| text.map(str::to_owned));
         let (name, rig, scene) = (read_name(&root)?, text("rig")?, text("scene")?);
         let region = read_region(root.required_table("region")?)?;
+        let sample = root.table("sample")?.map(|table| read_sample(table, &region)).transpose()?;
         let (schedule, order, repeat) = read_schedule(root.required_table("schedule")?)?;
         let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
         let dark = read_dark(root.required_table("dark")?, dwell)?;
@@ -64,6 +69,7 @@ impl Plan {
             rig,
             scene,
             region,
+            sample,
             schedule,
             order,
             repeat,
@@ -112,6 +118,51 @@ fn read_region(table: Table<'_>) -> Result<Region, Problem> {
     };
     table.finish()?;
     Ok(region)
+}
+
+/// `[sample]`: where the sample ends, as scenes say it: `x_mm` and `y_mm` = [low, high], or
+/// `radius_mm` with `centre_mm` = [x, y] (default: the origin). Its radiance is zero beyond. The
+/// region lies on it.
+fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
+    let metres = |(low, high): (f64, f64)| (low / 1e3, high / 1e3);
+    let x = table.interval("x_mm", PLACE_MM)?.map(metres);
+    let y = table.interval("y_mm", PLACE_MM)?.map(metres);
+    let radius = table.number("radius_mm", Bounds::positive_up_to(PLACE_MAX_MM))?;
+    let centre = table.numbers("centre_mm", PLACE_MM, 2..=2)?;
+    let keys = "x_mm with y_mm; or radius_mm, with centre_mm if it is not at the origin";
+    let wrong = |key: &str, what: &str| {
+        Err(table.problem(key, what, keys, "state one outline; without [sample] none is assumed"))
+    };
+    let outline = match (x, y, radius, &centre) {
+        (Some(x_m), Some(y_m), None, None) => Outline::Rectangle { x_m, y_m },
+        (None, None, Some(radius), centre) => {
+            let centre = centre.as_deref().unwrap_or(&[0.0, 0.0]);
+            let centre_m = (centre[0] / 1e3, centre[1] / 1e3);
+            Outline::Disk { centre_m, radius_m: radius / 1e3 }
+        }
+        (None, None, None, Some(_)) => return wrong("centre_mm", "a centre without a radius"),
+        (None, None, None, None) => return wrong("x_mm", "it has no outline"),
+        (Some(_), None, None, _) => return wrong("x_mm", "y_mm is missing beside it"),
+        (None, Some(_), None, _) => return wrong("y_mm", "x_mm is missing beside it"),
+        (Some(_), Some(_), None, Some(_)) => {
+            return wrong("centre_mm", "a rectangle is given by its sides");
+        }
+        (_, _, Some(_), _) => return wrong("radius_mm", "a disk and a rectangle at once"),
+    };
+    let (x, y) = (region.x_m, region.y_m);
+    let corners = [(x.0, y.0), (x.0, y.1), (x.1, y.0), (x.1, y.1)];
+    let inwards = |(x, y): (f64, f64)| (x * INWARDS, y * INWARDS);
+    if !corners.into_iter().map(inwards).all(|(x, y)| outline.holds(x, y)) {
+        let key = if radius.is_some() { "radius_mm" } else { "x_mm" };
+        return Err(table.problem(
+            key,
+            "the region reaches beyond the sample",
+            "a sample that holds the region's corners",
+            "lower the region: what is fitted there would be darkness",
+        ));
+    }
+    table.finish()?;
+    Ok(outline)
 }
 
 /// `[schedule]`: `kind`, and after it

@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use fit::Outline;
 use spanned_toml::{Document, Problem, Source};
 
 use super::*;
+use crate::rig::Rig;
 
 const FULL: &str = r#"
 name = "luminaire"
@@ -80,6 +82,35 @@ fn what_a_plan_leaves_out_has_a_default() {
     assert_eq!((plan.reference.every, plan.reference.dwell), (100, Duration::from_millis(20)));
     assert_eq!((plan.reference.pose.x_m, plan.reference.pose.theta_rad), (0.005, 0.0));
     assert_eq!((plan.gain, plan.warm_up, plan.stop), (None, None, Stop::default()));
+    assert_eq!(plan.sample, None);
+}
+
+#[test]
+fn the_sample_s_outline_is_a_rectangle_or_a_disk_that_holds_the_region() {
+    let with = |sample: &str| read(&FULL.replace("[dark]", &format!("[sample]\n{sample}\n[dark]")));
+    let rectangle = with("x_mm = [-30, 30]\ny_mm = [-10, 25]").unwrap().sample;
+    let (x_m, y_m) = ((-0.03, 0.03), (-0.01, 0.025));
+    assert_eq!(rectangle, Some(Outline::Rectangle { x_m, y_m }));
+    let disk = with("radius_mm = 30\ncentre_mm = [0, 5]").unwrap().sample;
+    assert_eq!(disk, Some(Outline::Disk { centre_m: (0.0, 0.005), radius_m: 0.03 }));
+    assert!(with("radius_mm = 30").is_ok());
+    for (sample, key) in [
+        ("", "sample.x_mm"),
+        ("x_mm = [-30, 30]", "sample.x_mm"),
+        ("y_mm = [-30, 30]", "sample.y_mm"),
+        ("radius_mm = -3", "sample.radius_mm"),
+        ("centre_mm = [0, 0]", "sample.centre_mm"),
+        ("x_mm = [-30, 30]\ny_mm = [-30, 30]\nradius_mm = 30", "sample.radius_mm"),
+        ("x_mm = [-30, 30]\ny_mm = [-30, 30]\ncentre_mm = [0, 0]", "sample.centre_mm"),
+        ("x_mm = [-30, 19]\ny_mm = [-30, 30]", "sample.x_mm"),
+        ("radius_mm = 25", "sample.radius_mm"),
+        ("radius_mm = 30\nrim_mm = 3", "sample.rim_mm"),
+    ] {
+        assert_eq!(with(sample).unwrap_err().key(), key, "{sample}");
+    }
+    let hash = |plan: Plan| plan.hash(&plan.lay_out(&Rig::built_in().unwrap(), None).unwrap());
+    let without = hash(read(FULL).unwrap());
+    assert_ne!(hash(with("radius_mm = 30").unwrap()), without);
 }
 
 #[test]

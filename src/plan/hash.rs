@@ -6,6 +6,7 @@
 use core::fmt;
 
 use firmware_protocol::Shutter;
+use fit::Outline;
 
 use super::{Plan, Sequence, Step};
 use crate::rig::ReadingKind;
@@ -33,6 +34,13 @@ impl Plan {
         }
         hash.integer(self.fit.angular_degree as u64);
         hash.integer(self.fit.position_degree as u64);
+        if let Some(outline) = &self.sample {
+            let numbers = match *outline {
+                Outline::Rectangle { x_m, y_m } => [x_m.0, x_m.1, y_m.0, y_m.1],
+                Outline::Disk { centre_m, radius_m } => [centre_m.0, centre_m.1, radius_m, -1.0],
+            };
+            numbers.into_iter().for_each(|number| hash.number(number));
+        }
         hash.number(self.stop.exitance_relative.unwrap_or(-1.0));
         hash.number(self.stop.rig_time_max.map_or(-1.0, |time| time.as_secs_f64()));
         if let Some(warm_up) = &self.warm_up {

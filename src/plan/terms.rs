@@ -4,6 +4,7 @@
 
 use std::time::Duration;
 
+use fit::Outline;
 use spanned_toml::Document;
 
 use crate::rig::Pose;
@@ -19,6 +20,8 @@ pub struct Plan {
     pub scene: Option<String>,
     /// `[region]`: where the fit shall hold.
     pub region: Region,
+    /// `[sample]`: where the sample ends; `None` where the plan does not say.
+    pub sample: Option<Outline>,
     /// `[schedule]`: which poses.
     pub schedule: Schedule,
     /// `schedule.order`.

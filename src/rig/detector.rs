@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use radiometry::DomainError;
+use radiometry::beam::Beam;
 use radiometry::throughput::CoaxialDisks;
 
 /// Elementary charge, coulomb (exact, SI 2019).
@@ -187,6 +188,12 @@ impl Detector {
         ];
         let u_m2_sr = libm::sqrt(terms.iter().map(|term| term * term).sum());
         u_m2_sr / self.throughput_m2_sr()
+    }
+
+    /// Its beam, every ray through pupil and spot; an error only for lengths that the rig reader
+    /// refuses.
+    pub fn beam(&self) -> Result<Beam, DomainError> {
+        Beam::of_spot(self.pupil_radius_m, self.spot_radius_m, self.distance_m)
     }
 
     /// Spot and pupil; an error only for lengths that the rig reader refuses.

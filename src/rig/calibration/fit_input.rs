@@ -30,7 +30,7 @@ impl Calibrated {
         let samples = used
             .iter()
             .map(|sample| fit::Sample {
-                ray: ray(sample.pose),
+                ray: sample.ray(),
                 value: sample.value,
                 noise: Noise::Modelled {
                     floor: sample.noise.floor,

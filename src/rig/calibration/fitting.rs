@@ -1,8 +1,8 @@
 //! The field that a run's samples show: the fit of all of them, or of those taken first.
 
-use fit::{BasisSpec, Fit, FitError, Region};
+use fit::{BasisSpec, Fit, FitError, Optics, Ray, Region};
 
-use super::{Calibrated, FitInput, Sample};
+use super::{Calibrated, FitInput, Flag, Sample};
 
 /// A fit, and how many samples it does not rest on.
 #[derive(Debug, Clone)]
@@ -14,10 +14,16 @@ pub struct Fitted {
 }
 
 impl Calibrated {
-    /// Fits the field to the usable samples.
-    pub fn fit(&self, region: &Region, basis: BasisSpec) -> Result<Fitted, FitError> {
+    /// Fits the field to the usable samples, each the mean over its beam; without optics the
+    /// radiance along its ray.
+    pub fn fit(
+        &self,
+        region: &Region,
+        basis: BasisSpec,
+        optics: Option<&Optics>,
+    ) -> Result<Fitted, FitError> {
         let FitInput { samples, common, .. } = self.fit_input();
-        let fit = fit::fit(&samples, region, basis, &common)?;
+        let fit = fit::fit_seen(&samples, region, basis, &common, optics)?;
         Ok(Fitted { fit, n_excluded: self.samples.len() - samples.len() })
     }
 
@@ -30,16 +36,20 @@ impl Calibrated {
         Self { samples, ..self.clone() }
     }
 
-    /// States every sample's uncertainty at the level that the fit gives it.
-    pub fn restate_from(&mut self, fit: &Fit) {
-        self.restate(|_, sample| {
-            let pose = sample.pose;
-            fit.value(&fit::Ray {
-                x_m: pose.x_m,
-                y_m: pose.y_m,
-                theta_rad: pose.theta_rad,
-                phi_rad: pose.phi_rad,
-            })
-        });
+    /// States every sample's uncertainty at the level that the fit gives its reading.
+    pub fn restate_from(&mut self, fit: &Fit, optics: Option<&Optics>) {
+        let rays: Vec<Ray> = self.samples.iter().map(Sample::ray).collect();
+        // What optics are wrong with has been said by the fit.
+        let levels = optics.and_then(|optics| fit.readings(&rays, optics).ok());
+        let levels = levels.unwrap_or_else(|| rays.iter().map(|ray| fit.value(ray)).collect());
+        self.restate(|i, _| levels[i]);
+    }
+
+    /// Flags the samples whose beam reaches beyond the sample's outline, where that is known.
+    pub fn flag_off_sample(&mut self, optics: &Optics) {
+        for sample in &mut self.samples {
+            let is_off = optics.reaches_beyond(&sample.ray());
+            sample.flags.set(Flag::OffSample, is_off);
+        }
     }
 }

@@ -64,7 +64,8 @@ pub enum Flag {
     Drift,
     /// Frames of its command were sent again. No harm to the value.
     LinkRetry,
-    /// The beam reaches beyond the sample. Set by who knows the sample's extent.
+    /// The beam reaches beyond the sample's outline, where the plan states it. The fit knows how
+    /// much of it: no harm.
     OffSample,
 }
 
@@ -121,11 +122,10 @@ impl Flags {
     }
 
     /// Whether the value says something else than the radiance at its pose, so that a fit must
-    /// leave it out. One below the noise stays in: leaving it out would bias the fit upwards.
+    /// leave it out. One below the noise stays in: leaving it out would bias the fit upwards. So
+    /// does one off the sample, of which the fit takes the mean over what is on it.
     pub const fn excludes_from_fit(self) -> bool {
-        self.contains(Flag::Saturated)
-            || self.contains(Flag::Unsettled)
-            || self.contains(Flag::OffSample)
+        self.contains(Flag::Saturated) || self.contains(Flag::Unsettled)
     }
 
     /// The flags that are set, in the order of [`Flag::ALL`].
@@ -148,6 +148,12 @@ impl fmt::Display for Flags {
 }
 
 impl Sample {
+    /// The measured ray as the fit takes it.
+    pub fn ray(&self) -> fit::Ray {
+        let Pose { x_m, y_m, theta_rad, phi_rad } = self.pose;
+        fit::Ray { x_m, y_m, theta_rad, phi_rad }
+    }
+
     /// States the uncertainty as it is at `level`: the fitted one where it is known.
     pub fn state_at(&mut self, level: f64) {
         self.u_independent =
