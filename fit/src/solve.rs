@@ -76,7 +76,7 @@ pub fn fit_seen(
     let coefficients = solution.unknowns(0);
     let shifts = shifts(common, &coefficients, &design, &solution);
     let levels = levels(&design, &coefficients);
-    let quality = quality(&design, &levels, &solution, settled.excess)?;
+    let quality = quality(&design, &levels, &solution, &settled)?;
     Fit::from_parts(Parts {
         region: *region,
         basis: basis.spec(),
@@ -188,9 +188,9 @@ fn quality(
     design: &Design<'_>,
     levels: &[f64],
     solution: &Solution,
-    excess: f64,
+    settled: &Settled,
 ) -> Result<Quality, FitError> {
-    let samples = design.samples();
+    let (samples, excess) = (design.samples(), settled.excess);
     let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     let model = Model::of(samples);
     let n = samples.len() as f64;
@@ -208,6 +208,6 @@ fn quality(
         residual_rms: (squares / n).sqrt(),
         chi2,
         excess_rms: excess.sqrt(),
-        beam: design.rows(),
+        beam: design.rows(&settled.variances),
     })
 }

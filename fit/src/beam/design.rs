@@ -29,7 +29,8 @@ pub struct BeamRows {
     pub off_sample: usize,
     /// Directions that the averaged and cut rows took.
     pub directions: u64,
-    /// By how much of its own independent u the quadrature may shift a derived quantity.
+    /// By how much of its own independent u the quadrature may shift a derived quantity, at most:
+    /// all rows erring as they may, each for the field that suits it worst.
     pub quadrature: f64,
 }
 
@@ -58,6 +59,8 @@ struct Averaged {
     /// would be too much to keep.
     kept: Vec<f64>,
     places: Vec<usize>,
+    /// What each row's quadrature may err by, in the samples' unit.
+    errors: Vec<f64>,
     rows: BeamRows,
 }
 
@@ -88,9 +91,16 @@ impl<'s> Design<'s> {
         self.basis
     }
 
-    /// `None` where there is no beam.
-    pub(crate) fn rows(&self) -> Option<BeamRows> {
-        self.beam.as_ref().map(|beam| beam.rows)
+    /// For samples that were weighted by these variances; `None` where there is no beam.
+    pub(crate) fn rows(&self, variances: &[f64]) -> Option<BeamRows> {
+        let beam = self.beam.as_ref()?;
+        let squares: Sum = beam
+            .errors
+            .iter()
+            .zip(variances)
+            .map(|(error, variance)| error * error / variance)
+            .collect();
+        Some(BeamRows { quadrature: squares.value().sqrt(), ..beam.rows })
     }
 
     pub(crate) fn room(&self) -> Room {
@@ -142,20 +152,16 @@ impl<'s> Design<'s> {
             return self.basis.value(coefficients, seen, &mut room.scratch)
                 - self.basis.value(coefficients, ray, &mut room.scratch);
         };
-        let kind = match kinds[i] {
-            Kind::Off => Kind::Across(0),
-            kind => kind,
-        };
-        let mut at = |ray: &Ray| {
-            averager.row(kind, ray, self.basis, &mut room.means, &mut room.row);
-            dot(&room.row, coefficients)
-        };
-        at(seen) - at(ray)
+        // The same rule for both, so that its error cancels.
+        let kind = if kinds[i] == Kind::Off { Kind::Across(0) } else { kinds[i] };
+        let level = self.level(i, coefficients, room);
+        averager.row(kind, seen, self.basis, &mut room.means, &mut room.row);
+        dot(&room.row, coefficients) - level
     }
 
     /// Whether an offset of all readings is a constant field: not where something cuts a beam.
     pub(crate) fn holds_constant(&self) -> bool {
-        self.rows().is_none_or(|rows| rows.cut == 0 && rows.off_sample == 0)
+        self.beam.as_ref().is_none_or(|beam| beam.rows.cut == 0 && beam.rows.off_sample == 0)
     }
 }
 
@@ -220,16 +226,16 @@ impl Averaged {
             kinds: Vec::with_capacity(samples.len()),
             kept: Vec::new(),
             places: Vec::new(),
+            errors: Vec::with_capacity(samples.len()),
             rows: BeamRows::default(),
         };
         let mut choice = Choice::new(basis);
-        let mut squares = Sum::default();
         for sample in samples {
             // In units of the field's size.
             let u = model.u_of(sample) / size;
             let (kind, error) = choice.of(&new.averager, &sample.ray, share * u);
             new.note(kind);
-            squares.add((error / u).powi(2));
+            new.errors.push(error * size);
             if keeps {
                 new.places.push(new.kept.len());
                 if matches!(kind, Kind::Smooth(_) | Kind::Across(_)) {
@@ -241,7 +247,6 @@ impl Averaged {
                 }
             }
         }
-        new.rows.quadrature = squares.value().sqrt();
         Ok(new)
     }
 
