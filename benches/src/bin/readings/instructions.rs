@@ -13,7 +13,10 @@ const RIGS: [(&str, &str); 3] = [
     ("flawed", "every flaw of detector and source is in"),
 ];
 const FEW: u64 = 20_000;
-const MANY: u64 = 120_000;
+const MANY: u64 = 520_000;
+/// A test of something absent would be one at least. What comes before the values is not quite the same
+/// twice: some thousands of instructions.
+const SAME_WITHIN: f64 = 0.5;
 
 /// Takes values and says nothing.
 pub(crate) fn take(rig: &str, count: &str) -> ExitCode {
@@ -49,13 +52,15 @@ pub(crate) fn compare(section: &mut Section) -> Result<(), Unmeasured> {
         let difference = counted(rig, MANY)? - counted(rig, FEW)?;
         let each = difference as f64 / (MANY - FEW) as f64;
         found.push(each);
-        shown.row([what.to_owned(), format!("{each:.3}")]);
+        shown.row([what.to_owned(), format!("{each:.2}")]);
     }
     section.say(
-        "A rig pays nothing for what is not in it: instructions a value, counted by callgrind.",
+        "A rig pays nothing for what is not in it: instructions a value, counted by callgrind. What \
+         comes before the values varies by some hundredths of an instruction a value; a test of \
+         something absent would be one at least.",
     );
     section.show(&shown);
-    let is_equal = (found[0] - found[1]).abs() < 1e-3 && found[2] > found[0];
+    let is_equal = (found[0] - found[1]).abs() < SAME_WITHIN && found[2] > found[0];
     section.aim("as many instructions as if it were not called for", is_equal);
     Ok(())
 }
