@@ -18,6 +18,7 @@ mod rays;
 mod request;
 mod solid_angles;
 mod statistics;
+mod unambiguous;
 
 use std::io::{self, BufRead as _, BufReader};
 use std::process::ExitCode;
@@ -29,6 +30,7 @@ use super::failure::{Failure, Outcome};
 use super::output::{say, say_json, write_out};
 use inputs::Inputs;
 use quantity::{Answer, Quantity};
+use unambiguous::Unambiguous;
 
 pub use request::answer_line;
 
@@ -120,7 +122,7 @@ fn read_value(text: &str) -> Option<Value> {
         let value: f64 = text.trim().parse().ok()?;
         value.is_finite().then(|| Value::from(value))
     };
-    if let Ok(value) = serde_json::from_str(text) {
+    if let Ok(Unambiguous(value)) = serde_json::from_str(text) {
         return Some(value);
     }
     if text.contains(',') {
@@ -181,7 +183,7 @@ mod tests {
         );
         let read = read_words(&words("--pixels equal-area")).unwrap();
         assert_eq!(Value::from(read), json!({"pixels": "equal-area"}));
-        for wrong in ["--a", "a 1", "--a NaN", "--a inf", "--a 1 --a 2", "--a 1,x"] {
+        for wrong in ["--a", "a 1", "--a NaN", "--a inf", "--a 1 --a 2", "--a 1,x", "--a {\"b\":1,\"b\":1}"] {
             assert!(read_words(&words(wrong)).is_err(), "{wrong}");
         }
     }

@@ -2,10 +2,11 @@
 //! that is no JSON is answered too, with its id if that can be made out.
 
 use serde::Deserialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::inputs::Inputs;
 use super::quantity::{self, Answer, Quantity, Refusal};
+use super::unambiguous::UnambiguousMap;
 
 /// A request as it is written.
 #[derive(Deserialize)]
@@ -15,7 +16,7 @@ struct Request {
     id: Value,
     quantity: String,
     #[serde(default)]
-    inputs: Map<String, Value>,
+    inputs: UnambiguousMap,
 }
 
 /// What is left of a request that can't be read as a whole.
@@ -31,7 +32,7 @@ pub fn answer_line(line: &[u8]) -> Value {
         Err(error) => {
             refused(&id_of(line), &Refusal::new(format!("the request is wrong: {error}")))
         }
-        Ok(Request { id, quantity, inputs }) => {
+        Ok(Request { id, quantity, inputs: UnambiguousMap(inputs) }) => {
             let found = quantity::named(&quantity).and_then(|quantity| {
                 quantity.answer(Inputs::new(&inputs)).map(|answer| (quantity, answer))
             });
@@ -88,6 +89,19 @@ mod tests {
         for line in [&b"not json"[..], b"\xff\xfe", b"[]", b"7"] {
             let answer = answer_line(line);
             assert!(answer["id"].is_null() && answer["error"].is_string());
+        }
+    }
+
+    #[test]
+    fn an_input_given_twice_is_refused_by_name() {
+        for line in [
+            r#"{"id": "a", "quantity": "wrap-angle", "inputs": {"angle": 1, "angle": 2}}"#,
+            r#"{"id": "a", "quantity": "wrap-angle", "inputs": {"angle": {"angle": 1, "angle": 1}}}"#,
+        ] {
+            let answer = answer_line(line.as_bytes());
+            assert_eq!(answer["id"], "a", "{line}");
+            let error = answer["error"].as_str().unwrap();
+            assert!(error.contains("`angle` is given twice"), "{error}");
         }
     }
 
