@@ -321,3 +321,33 @@ fn knots_without_meaning_are_refused_with_their_value() {
     assert!(spline.nonzero(-1e-9).is_err() && spline.nonzero(f64::NAN).is_err());
     assert!(spline.integrals(0.5, 0.4, &mut [0.0; 2]).is_err());
 }
+
+#[test]
+fn integrals_over_any_part_agree_with_quadrature_of_the_values() {
+    let tolerance = Tolerance::new(1e-10, 1e-11, 200_000).unwrap();
+    let breaks = [0.0, 0.7, 1.0, 2.5, 3.0];
+    for degree in 0..=4 {
+        for spline in [BSpline::open(degree, &breaks), BSpline::periodic(degree, &breaks)] {
+            let Ok(spline) = spline else { continue };
+            let (mut areas, mut values) = (vec![0.0; spline.len()], vec![0.0; spline.len()]);
+            for (from, to) in [(0.0, 3.0), (0.2, 0.6), (0.3, 2.7), (1.1, 1.1), (0.7, 2.5)] {
+                spline.integrals(from, to, &mut areas).unwrap();
+                let inner = breaks.iter().copied().filter(|at| from < *at && *at < to);
+                let ends: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
+                for (i, area) in areas.iter().enumerate() {
+                    let value = |x: f64| {
+                        spline.evaluate(x, &mut values).unwrap();
+                        values[i]
+                    };
+                    let summed = if from < to {
+                        adaptive_between(value, &ends, tolerance).unwrap().value
+                    } else {
+                        0.0
+                    };
+                    let said = format!("degree {degree}, {i} in {from}..{to}");
+                    assert!((area - summed).abs() < 1e-10, "{said}: {area}, summed {summed}");
+                }
+            }
+        }
+    }
+}

@@ -4,8 +4,8 @@
 use glam::DVec3;
 use radiometry::Tolerance;
 use radiometry::enclosure::Enclosure;
-use radiometry::form_factor::aligned_rectangles;
-use radiometry::quantity::FormFactor;
+use radiometry::form_factor::{aligned_rectangles, concentric_spheres};
+use radiometry::quantity::{Area, Exitance, FormFactor};
 use radiometry::shape::Polygon;
 
 fn face(corners: &[[f64; 3]]) -> Polygon {
@@ -102,4 +102,59 @@ fn a_room_round_a_corner_closes() {
     let open = aligned_rectangles([0.0, 1.0], [0.0, 1.5], [0.0, 1.0], [0.0, 1.5], 3.0).unwrap();
     let straight = enclosure.form_factor(3, 7).unwrap().ratio();
     assert!(straight > 0.0 && straight > open.ratio() / 2.0, "{straight}");
+}
+
+/// One photon after another between a ball and the shell about it, which are evenly lit by symmetry.
+#[test]
+fn photons_between_concentric_spheres_find_the_radiosity() {
+    use std::f64::consts::PI;
+    const PHOTONS: u32 = 30_000;
+    const REFLECTANCE: [f64; 2] = [0.6, 0.8];
+    let mut state = 17_u64;
+    let mut unit = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 11) as f64 * (-53_f64).exp2()
+    };
+    for (inner, is_lit) in [(0.4, [true, false]), (0.8, [false, true]), (0.6, [true, true])] {
+        let radii: [f64; 2] = [inner, 1.0];
+        let areas = radii.map(|r| 4.0 * PI * r * r);
+        let emitted = is_lit.map(|lit| if lit { 2.0 } else { 0.0 });
+        let flux = [emitted[0] * areas[0], emitted[1] * areas[1]];
+        let outward = concentric_spheres(inner, 1.0).unwrap();
+        // The shell's factor to the ball is the one that is asked for.
+        let enclosure = Enclosure::new(&[areas[1], areas[0]].map(Area::from_m2), |_, _| outward);
+        let sources = [emitted[1], emitted[0]].map(Exitance::from_w_per_m2);
+        let found = enclosure.unwrap().radiosity(&sources, &[REFLECTANCE[1], REFLECTANCE[0]]);
+        let found = found.unwrap();
+
+        let (mut arrived, mut squares) = ([0.0; 2], [0.0; 2]);
+        for _ in 0..PHOTONS {
+            let mut surface = usize::from(unit() * (flux[0] + flux[1]) >= flux[0]);
+            let mut hits = [0.0_f64; 2];
+            loop {
+                // Lambert's law about the normal; a sphere looks the same from all its places.
+                // How near a ray from the shell comes to the middle: the sine of its angle to the normal.
+                let nearest = unit().sqrt();
+                surface = usize::from(surface == 0 || nearest > inner);
+                hits[surface] += 1.0;
+                if unit() >= REFLECTANCE[surface] {
+                    break;
+                }
+            }
+            for i in 0..2 {
+                arrived[i] += hits[i];
+                squares[i] += hits[i] * hits[i];
+            }
+        }
+        for (i, irradiance) in [found.irradiance[1], found.irradiance[0]].iter().enumerate() {
+            let count = f64::from(PHOTONS);
+            let mean = arrived[i] / count;
+            let deviation = ((squares[i] / count - mean * mean) / count).sqrt();
+            let expected = irradiance.w_per_m2() * areas[i] / (flux[0] + flux[1]);
+            assert!(
+                (mean - expected).abs() < 5.0 * deviation && deviation < 0.02 * mean,
+                "{inner}, surface {i}: {expected} hits a photon, counted {mean} ± {deviation}"
+            );
+        }
+    }
 }

@@ -165,7 +165,8 @@ impl PartialEq for Piece {
 impl Eq for Piece {}
 
 /// ∬ f dA over all cells, to the tolerance. Peaks should lie on corners of cells: a rule of 64 nodes
-/// cannot know of one between them.
+/// cannot know of one between them. Kinks and steps should lie on edges: where one cuts a corner off a
+/// cell between the nodes the error can be several times the bound.
 /// Who needs it: form factors past occluders; the tests of closed forms.
 ///
 /// ```
