@@ -108,8 +108,7 @@ fn read_words(words: &[String]) -> Result<Map<String, Value>, String> {
             Some((name, value)) => (name, value),
             None => (name, words.next().ok_or_else(|| format!("--{name} has no value"))?.as_str()),
         };
-        let value = read_value(value)
-            .ok_or_else(|| format!("--{name} is `{value}`, expected a number or JSON"))?;
+        let value = read_value(value).map_err(|why| format!("--{name} is `{value}`, {why}"))?;
         if inputs.insert(name.replace('-', "_"), value).is_some() {
             return Err(format!("--{name} is given twice"));
         }
@@ -117,22 +116,27 @@ fn read_words(words: &[String]) -> Result<Map<String, Value>, String> {
     Ok(inputs)
 }
 
-fn read_value(text: &str) -> Option<Value> {
+fn read_value(text: &str) -> Result<Value, String> {
+    let expected = || String::from("expected a number or JSON");
     let number = |text: &str| {
         let value: f64 = text.trim().parse().ok()?;
         value.is_finite().then(|| Value::from(value))
     };
-    if let Ok(Unambiguous(value)) = serde_json::from_str(text) {
-        return Some(value);
+    match serde_json::from_str(text) {
+        Ok(Unambiguous(value)) => return Ok(value),
+        // Of JSON's form, but not to be taken as it is.
+        Err(error) if error.is_data() => return Err(format!("where {error}")),
+        Err(_) => {}
     }
     if text.contains(',') {
-        return text.split(',').map(number).collect::<Option<Vec<_>>>().map(Value::from);
+        let numbers = text.split(',').map(number).collect::<Option<Vec<_>>>();
+        return numbers.map(Value::from).ok_or_else(expected);
     }
     // A word; `inf` and `nan` are numbers, if no finite ones.
     let is_word = text.starts_with(|c: char| c.is_ascii_lowercase())
         && text.chars().all(|c| c.is_ascii_lowercase() || c == '-')
         && text.parse::<f64>().is_err();
-    if is_word { Some(text.into()) } else { number(text) }
+    if is_word { Ok(text.into()) } else { number(text).ok_or_else(expected) }
 }
 
 fn list(is_json: bool) -> Result<(), Failure> {
@@ -183,8 +187,10 @@ mod tests {
         );
         let read = read_words(&words("--pixels equal-area")).unwrap();
         assert_eq!(Value::from(read), json!({"pixels": "equal-area"}));
-        for wrong in ["--a", "a 1", "--a NaN", "--a inf", "--a 1 --a 2", "--a 1,x", "--a {\"b\":1,\"b\":1}"] {
+        for wrong in ["--a", "a 1", "--a NaN", "--a inf", "--a 1 --a 2", "--a 1,x"] {
             assert!(read_words(&words(wrong)).is_err(), "{wrong}");
         }
+        let twice = read_words(&words(r#"--a {"b":1,"b":1}"#)).unwrap_err();
+        assert!(twice.contains("`b` is given twice"), "{twice}");
     }
 }
