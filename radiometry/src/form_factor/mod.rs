@@ -45,6 +45,9 @@ const UNLIKE_SIZES: DomainError = DomainError::Placing {
     expected: "lengths within 150 powers of ten of each other",
 };
 
+/// The least length, in units of the largest, whose square has digits.
+const LEAST_SQUARED: f64 = 1e-150;
+
 /// A form factor whose last rounding may have left [0, 1].
 fn form_factor(ratio: f64) -> Result<FormFactor, DomainError> {
     if ratio.is_nan() {

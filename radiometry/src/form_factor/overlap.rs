@@ -11,9 +11,6 @@ use crate::quadrature::{Sum, adaptive_between, gauss_legendre};
 /// Sums whose terms are larger than this times the sum give way to a positive integral.
 const CANCELLATION_MAX: f64 = 30.0;
 
-/// Of a stretch: what peaks more narrowly than this takes more panels than an adaptive rule.
-const FINEST: f64 = 1e-7;
-
 /// What the integral that stands in for a closed form is asked for.
 pub(super) fn kernel() -> Tolerance {
     Tolerance::FINE.tightened(0.2)
@@ -103,12 +100,12 @@ impl Overlap {
                 stretches.push(Stretch { near, reach, weight_near, weight_step });
             }
         };
-        for (from, reach, weight, step) in [
-            (start, self.ramp, 0.0, self.level),
-            (level_start, level_end - level_start, self.level, 0.0),
-            (end - self.ramp, self.ramp, self.level, -self.level),
+        // Both ends as they are: an end near 0 is lost in the sum of the other and the reach.
+        for (from, to, reach, weight, step) in [
+            (start, level_start, self.ramp, 0.0, self.level),
+            (level_start, level_end, level_end - level_start, self.level, 0.0),
+            (end - self.ramp, end, self.ramp, self.level, -self.level),
         ] {
-            let to = from + reach;
             if from < 0.0 && to > 0.0 {
                 let at_zero = weight + step * (-from / reach);
                 push(0.0, from, at_zero, weight - at_zero);
@@ -149,10 +146,10 @@ impl Overlap {
         adaptive_between(at, &points, tolerance)
     }
 
-    /// Whether the panels find a peak of that width around 0.
-    pub(super) fn resolves(&self, width: f64) -> bool {
-        let is_wide = |s: &Stretch| libm::hypot(s.near, width) >= FINEST * s.reach.abs();
-        self.stretches().iter().all(is_wide)
+    /// How narrow a peak of that width around 0 is, in parts of the stretch that it is narrowest in.
+    pub(super) fn narrowness(&self, width: f64) -> f64 {
+        let narrow = |s: Stretch| libm::hypot(s.near, width) / s.reach.abs();
+        self.stretches().into_iter().map(narrow).fold(f64::INFINITY, f64::min)
     }
 
     /// ∫ weight(v) f(v) dv to rounding, for a positive f that is smooth but for poles or branches at
@@ -201,7 +198,8 @@ impl Overlap {
                 // + at the outer breaks, - at the inner ones.
                 let sign = if (i == 0 || i == 3) == (j == 0 || j == 3) { 1.0 } else { -1.0 };
                 let (slant_u, slant_v) = (libm::hypot(u, z), libm::hypot(v, z));
-                let ratio = (u / z) * (u / z) + (v / z) * (v / z);
+                // Where that overflows, z² takes the logarithm to 0.
+                let ratio = ((u / z) * (u / z) + (v / z) * (v / z)).min(f64::MAX);
                 for term in [
                     u * slant_v * libm::atan2(u, slant_v),
                     v * slant_u * libm::atan2(v, slant_u),

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{contour, contour_wide, integrated, pairs};
+use super::{LEAST_SQUARED, UNLIKE_SIZES, contour, contour_wide, integrated, pairs};
 use crate::direction::normalised;
 use crate::domain::{DomainError, positive};
 use crate::error_free::DoubleDouble;
@@ -62,6 +62,10 @@ pub(super) fn unhindered(
         Err(EstimateError::Unmet { estimate, .. }) => estimate,
         other => return integrated(other, 0.0, 1.0 / area, tolerance),
     };
+    // What passes between areas below this leaves the doubles' range, and would eat the budget.
+    if pair.area_from.min(pair.area_to) < LEAST_SQUARED * LEAST_SQUARED {
+        return Err(UNLIKE_SIZES.into());
+    }
     let mut other_ways: [Way; 2] = [contour_wide::exchange, pairs::exchange];
     // The positive kernel is smooth from afar.
     if facing.is_far() {
