@@ -86,20 +86,14 @@ pub fn aligned_rectangles(
     if narrowest < NARROWEST {
         return Err(DomainError::Lost { result: "the form factor" }.into());
     }
-    let integral = if !ADAPTIVE.contains(&narrowest) {
-        along_y.graded(
-            |v| {
-                along_x
-                    .between_strips(v, z, |f, rho| Ok(along_x.graded(f, rho, None)))
-                    .unwrap_or(f64::NAN)
-            },
-            z,
-            None,
-        )
-    } else {
+    let integral = if ADAPTIVE.contains(&narrowest) {
         let adaptive = |f: &dyn Fn(f64) -> f64, _| Ok(along_x.integrate(f, kernel())?.value);
         let across = |v: f64| along_x.between_strips(v, z, adaptive).unwrap_or(f64::NAN);
         along_y.integrate(across, kernel())?.value
+    } else {
+        let panels = |f: &dyn Fn(f64) -> f64, rho| Ok(along_x.graded(f, rho, None));
+        let across = |v: f64| along_x.between_strips(v, z, panels).unwrap_or(f64::NAN);
+        along_y.graded(across, z, None)
     };
     Ok(form_factor(integral / (PI * area))?)
 }
