@@ -51,9 +51,15 @@ fn mutate(value: &mut Value, dice: &mut Dice) {
                 let (from, to) = (dice.below(items.len()), dice.below(items.len()));
                 items[to] = items[from].clone();
             }
-            items.iter_mut().for_each(|item| mutate(item, dice));
+            for item in items {
+                mutate(item, dice);
+            }
         }
-        Value::Object(fields) => fields.values_mut().for_each(|field| mutate(field, dice)),
+        Value::Object(fields) => {
+            for field in fields.values_mut() {
+                mutate(field, dice);
+            }
+        }
         _ => {}
     }
 }

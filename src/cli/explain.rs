@@ -26,7 +26,7 @@ const SEED: u64 = 1;
 /// Readings that are timed at a time, each at a pose of its own.
 const READINGS: u32 = 48;
 /// Longer than any axis takes to come to rest.
-const REST: Duration = Duration::from_secs(60);
+const REST: Duration = Duration::from_mins(1);
 /// The quickest of so many times is the one that nothing disturbed.
 const ROUNDS: usize = 7;
 

@@ -39,7 +39,9 @@ impl Plan {
                 Outline::Rectangle { x_m, y_m } => [x_m.0, x_m.1, y_m.0, y_m.1],
                 Outline::Disk { centre_m, radius_m } => [centre_m.0, centre_m.1, radius_m, -1.0],
             };
-            numbers.into_iter().for_each(|number| hash.number(number));
+            for number in numbers {
+                hash.number(number);
+            }
         }
         hash.number(self.stop.exitance_relative.unwrap_or(-1.0));
         hash.number(self.stop.rig_time_max.map_or(-1.0, |time| time.as_secs_f64()));

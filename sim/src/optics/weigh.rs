@@ -236,12 +236,12 @@ fn cheapest(
 /// Some of the field's landmarks, and rays at places and directions that lie in line with nothing: a
 /// rule that is symmetric to an outline through the beam's middle has no error there.
 fn anywhere_rays(setting: &Setting<'_>) -> Vec<Ray> {
+    // Powers of the root of t⁵ = t + 1: evenly in four dimensions (Roberts 2018).
+    const ROOT: f64 = 1.167_303_978_261_418_7;
     let Region { x_m, y_m, theta_max_rad } = setting.region;
     let landmarks = setting.field.landmarks(&setting.region);
     let every = landmarks.len().div_ceil(LANDMARKS).max(1);
     let mut rays: Vec<Ray> = landmarks.into_iter().step_by(every).collect();
-    // Powers of the root of t⁵ = t + 1: evenly in four dimensions (Roberts 2018).
-    const ROOT: f64 = 1.167_303_978_261_418_7;
     for i in 1..=ANYWHERE {
         let part = |k: i32| {
             let at = f64::from(i) * libm::pow(ROOT, -f64::from(k));
