@@ -116,7 +116,7 @@ impl Candidate {
             influence,
             error: None,
             how_in: how_in.to_owned(),
-            how_out: format!("not called for: {key}"),
+            how_out: if calls { String::new() } else { format!("not called for: {key}") },
         }
     }
 
@@ -238,15 +238,20 @@ fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
         Why::Forced => format!("{how_in} (forced)"),
         Why::NotCalledFor => how_out,
         Why::BelowTolerance => {
-            format!(
-                "left out: what is left out stays within the tolerance of {tolerance:.1e}; {how_out}"
-            )
+            let why =
+                format!("left out: what is left out stays within the tolerance of {tolerance:.1e}");
+            followed_by(why, &how_out)
         }
-        Why::Without => format!("left out by request; {how_out}"),
+        Why::Without => followed_by("left out by request".to_owned(), &how_out),
     };
     let included = matches!(why, Why::CalledFor | Why::Forced);
     let error = error.filter(|_| included);
     EffectRow { name, included, can_be_left_out, cause, bound, error, cost_ns: None, how }
+}
+
+/// What a reading is taken for stands behind why, where there is something to say of it.
+fn followed_by(why: String, how_out: &str) -> String {
+    if how_out.is_empty() { why } else { format!("{why}; {how_out}") }
 }
 
 /// Names that are none, and wishes that can't be granted.
