@@ -1,8 +1,11 @@
 //! Solid angles and projected solid angles against cubature over the source, from the definition
 //! ∬ cos θ cos θ'/r² dA, and what had no rays yet against rays: nothing here knows a closed form.
 
+mod dice;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use dice::{Dice, SIGMAS, mean};
 use glam::{DVec2, DVec3};
 use radiometry::basis::Zernike;
 use radiometry::environment::EqualArea;
@@ -14,36 +17,7 @@ use radiometry::shape::{Disk, HalfPlane, Polygon, Sphere};
 use radiometry::solid_angle;
 use radiometry::{Estimate, EstimateError, Tolerance};
 
-/// `SplitMix64` (Steele, Lea and Flood 2014).
-struct Dice(u64);
-
 impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let (z, phi) = (self.between(-1.0, 1.0), self.between(-PI, PI));
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * phi.cos(), across * phi.sin(), z)
-    }
-
-    /// Cosine-weighted about a unit normal.
-    fn ray(&mut self, normal: DVec3) -> DVec3 {
-        let (x, y) = normal.any_orthonormal_pair();
-        let square = self.unit();
-        let across = DVec2::from_angle(TAU * self.unit()) * square.sqrt();
-        x * across.x + y * across.y + normal * (1.0 - square).sqrt()
-    }
-
     /// A disk and a triangle in space, some way off.
     fn disk(&mut self) -> Disk {
         Disk::new(self.direction() * 1.5, self.direction(), self.between(0.2, 0.9)).unwrap()
@@ -53,22 +27,6 @@ impl Dice {
         let middle = self.direction() * 1.5;
         [0; 3].map(|_| middle + 0.8 * self.direction())
     }
-}
-
-/// One in 10^7 by chance.
-const SIGMAS: f64 = 5.3;
-
-/// The mean of samples, and its standard deviation.
-fn mean(samples: u32, mut sample: impl FnMut() -> f64) -> (f64, f64) {
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for _ in 0..samples {
-        let value = sample();
-        sum += value;
-        squares += value * value;
-    }
-    let count = f64::from(samples);
-    let mean = sum / count;
-    (mean, ((squares / count - mean * mean) / count).sqrt())
 }
 
 /// The part of a whole that tests pass, and its standard deviation.

@@ -1,8 +1,11 @@
 //! Irradiance from environment maps: what must hold for every map and every normal, and the same numbers
 //! by quadrature of the clipped cosine and by rays at random, which share nothing with the kernel.
 
+mod dice;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use dice::Dice;
 use glam::DVec3;
 use radiometry::direction::{frame, unit};
 use radiometry::environment::{EnvironmentError, LatLong};
@@ -10,33 +13,7 @@ use radiometry::quadrature::{adaptive, gauss_legendre};
 use radiometry::quantity::{Luminance, Radiance};
 use radiometry::{DomainError, Estimate, Tolerance};
 
-/// `SplitMix64` (Steele, Lea and Flood 2014).
-struct Dice(u64);
-
 impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.unit() - 1.0;
-        let phi = TAU * self.unit();
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * phi.cos(), across * phi.sin(), z)
-    }
-
-    /// Cosine-weighted about a normal.
-    fn ray(&mut self, normal: DVec3) -> DVec3 {
-        let (x, y) = frame(normal);
-        let (square, phi) = (self.unit(), TAU * self.unit());
-        let across = square.sqrt();
-        x * (across * phi.cos()) + y * (across * phi.sin()) + normal * (1.0 - square).sqrt()
-    }
-
     /// Some pixels dark, some bright, one a Sun.
     fn radiances(&mut self, count: usize) -> Vec<f64> {
         let mut radiances: Vec<f64> =

@@ -1,33 +1,18 @@
 //! The equal-area environment map: against the published map from the square to the sphere, written down
 //! once more, and against what must hold for every map and normal.
 
-use std::f64::consts::{FRAC_PI_4, PI, TAU};
+mod dice;
 
+use std::f64::consts::{FRAC_PI_4, PI};
+
+use dice::Dice;
 use glam::DVec3;
 use radiometry::direction::{frame, unit};
 use radiometry::environment::{EnvironmentError, EqualArea};
 use radiometry::quantity::Radiance;
 use radiometry::{Estimate, EstimateError, Tolerance};
 
-/// `SplitMix64` (Steele, Lea and Flood 2014).
-struct Dice(u64);
-
 impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.unit() - 1.0;
-        let phi = TAU * self.unit();
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * phi.cos(), across * phi.sin(), z)
-    }
-
     fn radiances(&mut self, side: usize) -> Vec<f64> {
         (0..side * side).map(|_| (8.0 * self.unit() - 3.0).max(0.0).exp() - 1.0).collect()
     }

@@ -1,47 +1,17 @@
 //! Projected solid angles against rays shot at random with a fixed seed: another method, which shares
 //! nothing with the kernels but the geometry.
 
-use std::f64::consts::{PI, TAU};
+mod dice;
 
+use std::f64::consts::PI;
+
+use dice::Dice;
 use glam::DVec3;
 use radiometry::projected::{self, Occluder, Receiver, Source, occluded};
 use radiometry::shape::{Disk, HalfPlane, Polygon, Sphere};
 use radiometry::{DomainError, EstimateError, Tolerance, direction, solid_angle};
 
-/// `SplitMix64` (Steele, Lea and Flood 2014).
-struct Dice(u64);
-
 impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let z = self.between(-1.0, 1.0);
-        let phi = self.between(-PI, PI);
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * phi.cos(), across * phi.sin(), z)
-    }
-
-    /// Cosine-weighted about a normal.
-    fn ray(&mut self, normal: DVec3) -> DVec3 {
-        let (tangent, bitangent) = direction::frame(normal);
-        let square = self.unit();
-        let phi = TAU * self.unit();
-        let across = square.sqrt();
-        tangent * (across * phi.cos())
-            + bitangent * (across * phi.sin())
-            + normal * (1.0 - square).sqrt()
-    }
-
     fn disk(&mut self, distance: f64) -> Disk {
         let center = self.direction() * distance;
         let radius = self.between(0.1, 0.45) * distance;

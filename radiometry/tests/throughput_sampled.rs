@@ -1,8 +1,11 @@
 //! Throughputs against lines thrown at random with a fixed seed, and against plain sums over the
 //! infinitesimal beams that they are made of: from the definitions, by nothing of the kernels' own.
 
+mod dice;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use dice::{Dice, SIGMAS, mean};
 use glam::{DVec2, DVec3};
 use radiometry::chart::{Environment, Line, Perpendicular, Surface, TwoPlane};
 use radiometry::convex::{self, ConvexBody};
@@ -11,45 +14,6 @@ use radiometry::quantity::Area;
 use radiometry::shape::Polygon;
 use radiometry::throughput::{coaxial_disks, infinitesimal_beam};
 use radiometry::{Tolerance, form_factor, projected};
-
-/// `SplitMix64` (Steele, Lea and Flood 2014).
-struct Dice(u64);
-
-impl Dice {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let (z, phi) = (self.between(-1.0, 1.0), self.between(-PI, PI));
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * phi.cos(), across * phi.sin(), z)
-    }
-}
-
-/// One in 10^7 by chance.
-const SIGMAS: f64 = 5.3;
-
-/// The mean of samples, and its standard deviation.
-fn mean(samples: u32, mut sample: impl FnMut() -> f64) -> (f64, f64) {
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for _ in 0..samples {
-        let value = sample();
-        sum += value;
-        squares += value * value;
-    }
-    let count = f64::from(samples);
-    let mean = sum / count;
-    (mean, ((squares / count - mean * mean) / count).sqrt())
-}
 
 #[track_caller]
 fn agrees(what: &str, closed: f64, (found, deviation): (f64, f64)) {
