@@ -124,7 +124,7 @@ pub(crate) struct RigArgs {
 pub(crate) struct EffectArgs {
     /// How much all effects that are left out may change a reading, relative to it. Default: a
     /// tenth of the predicted noise of one dwell.
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
     /// Simulate this effect however little it matters; may be given several times.
     #[arg(long, value_name = "EFFECT")]

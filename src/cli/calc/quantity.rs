@@ -232,7 +232,12 @@ pub(super) fn all() -> impl Iterator<Item = &'static Quantity> {
 /// The quantity of that name.
 pub(super) fn named(name: &str) -> Result<&'static Quantity, Refusal> {
     all().find(|quantity| quantity.name == name).ok_or_else(|| {
-        Refusal::new(format!("quantity `{name}` is not known; `gonio calc --list` shows them all"))
+        let known: Vec<String> = all().map(|quantity| quantity.name.to_owned()).collect();
+        let meant = spanned_toml::nearest(name, &known)
+            .map_or_else(String::new, |nearest| format!(", did you mean `{nearest}`?"));
+        Refusal::new(format!(
+            "quantity `{name}` is not known{meant}; `gonio calc --list` shows them all"
+        ))
     })
 }
 
@@ -250,6 +255,13 @@ mod tests {
             let declared: BTreeSet<_> = quantity.inputs.iter().map(|i| i.name).collect();
             assert_eq!(declared.len(), quantity.inputs.len(), "{}", quantity.name);
         }
+    }
+
+    #[test]
+    fn a_slip_in_a_name_is_answered_with_the_name() {
+        let refusal = named("disk-sold-angle").err().expect("no such quantity").to_string();
+        assert!(refusal.contains("did you mean `disk-solid-angle`?"), "{refusal}");
+        assert!(!named("x").err().expect("none").to_string().contains("did you mean"));
     }
 
     #[test]
