@@ -60,12 +60,12 @@ pub(crate) fn check(
 fn check_terms(terms: &Terms) -> Result<(), CompileError> {
     let not_negative = |name: &'static str, value: f64| {
         let sound = value.is_finite() && value >= 0.0;
-        if sound { Ok(()) } else { Err(CompileError::Terms(name, value)) }
+        if sound { Ok(()) } else { Err(CompileError::Terms(name, value, "0 or more")) }
     };
     not_negative("tolerance", terms.tolerance.unwrap_or(0.0))?;
     not_negative("run's length", terms.run_s)?;
     if terms.dwell_s <= 0.0 {
-        return Err(CompileError::Terms("dwell", terms.dwell_s));
+        return Err(CompileError::Terms("dwell", terms.dwell_s, "more than 0 s"));
     }
     not_negative("dwell", terms.dwell_s)?;
     if let Some(region) = &terms.region {
@@ -74,7 +74,7 @@ fn check_terms(terms: &Terms) -> Result<(), CompileError> {
         }
         let theta = region.theta_max_rad;
         if !(0.0..=core::f64::consts::FRAC_PI_2).contains(&theta) {
-            return Err(CompileError::Terms("region's θ", theta));
+            return Err(CompileError::Terms("region's θ", theta, "0 to π/2 rad"));
         }
     }
     Ok(())

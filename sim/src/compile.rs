@@ -81,8 +81,8 @@ pub enum CompileError {
         /// The rig's.
         rig: Quantity,
     },
-    /// A number of the terms that makes no sense: name, value.
-    Terms(&'static str, f64),
+    /// A number of the terms that makes no sense: name, value, what was expected.
+    Terms(&'static str, f64, &'static str),
     /// A wish for an effect that is none.
     UnknownEffect {
         /// As it was written.
@@ -383,7 +383,9 @@ impl fmt::Display for CompileError {
                 rig.name()
             ),
             Self::Scene(what) => f.write_str(what),
-            Self::Terms(name, value) => write!(f, "{name}: {value} is not what a plan has"),
+            Self::Terms(name, value, expected) => {
+                write!(f, "{name} is {value}, expected {expected}")
+            }
             Self::UnknownEffect { name, nearest, known } => {
                 write!(f, "no effect is called {name}")?;
                 if let Some(nearest) = nearest {

@@ -319,8 +319,20 @@ fn compile(scene: sim::Scene, rig: &Rig, terms: &sim::Terms) -> Result<Stage, Fa
     let simulated = simulated.unwrap_or_default();
     let faults = simulated.faults;
     let compiled = sim::compile(scene, nominal(rig), simulated, terms)
-        .map_err(|error| Failure::start(format!("{}: {error}", rig.document().source().name())))?;
+        .map_err(|error| refused(&error, rig))?;
     Ok(Stage { compiled: Arc::new(compiled), faults, seed: terms.seed })
+}
+
+/// Where what can't be compiled was written: in the rig's file, in the scene's, or on the command line.
+fn refused(error: &sim::CompileError, rig: &Rig) -> Failure {
+    use sim::CompileError as E;
+    match error {
+        E::Effect { .. } | E::Quantity { .. } | E::Terms(..) | E::UnknownEffect { .. } => {
+            Failure::start(error)
+        }
+        E::Scene(_) | E::Unsupported(_) => Failure::start(format!("the scene: {error}")),
+        _ => Failure::start(format!("{}: {error}", rig.document().source().name())),
+    }
 }
 
 /// A plan without a name is called after its folder.
