@@ -57,7 +57,7 @@ impl SimulatedBoard {
         Self {
             boot_id: mix(mix(compiled.seed) ^ u64::from(boot)) as u32,
             identities: identities.collect(),
-            axes: core::array::from_fn(|axis| Axis::at_boot(&compiled.axes[axis])),
+            axes: core::array::from_fn(|axis| Axis::at_boot(&compiled.drawn.axes[axis])),
             axis_of_channel,
             stages: compiled.stages(),
             reading_s: 1.0 / f64::from(nominal.detector.adc_rate_hz),
@@ -75,7 +75,7 @@ impl SimulatedBoard {
     }
 
     fn detector_axis(&self, now: Instant) -> optics::Axis {
-        self.compiled.kinematics.seen(core::array::from_fn(|axis| self.axes[axis].value(now)))
+        self.compiled.drawn.kinematics.seen(core::array::from_fn(|axis| self.axes[axis].value(now)))
     }
 
     fn axis(&mut self, channel: u8) -> Option<&mut Axis> {
@@ -94,7 +94,7 @@ impl SimulatedBoard {
             Shutter::Closed => 0.0,
             Shutter::Open if rests_at.is_none_or(|at| at <= begin) => self.light_a(now),
             Shutter::Open => {
-                let moments = self.compiled.moments.iter();
+                let moments = self.compiled.drawn.moments.iter();
                 let at = |before_end: f64| earlier(now, before_end * self.reading_s);
                 moments.map(|moment| moment.weight * self.light_a(at(moment.before_end))).sum()
             }
@@ -108,7 +108,7 @@ impl SimulatedBoard {
     /// At a moment, amperes.
     fn light_a(&self, now: Instant) -> f64 {
         let radiance = self.compiled.optics.radiance(&self.detector_axis(now));
-        radiance * self.compiled.current_per_radiance
+        radiance * self.compiled.drawn.current_per_radiance
     }
 }
 
@@ -192,7 +192,7 @@ impl Board for SimulatedBoard {
         let light_a = self.photocurrent_a(now);
         let current_a = self.stages.pass(Interval::ending(now, self.reading_s), light_a);
         let gain = self.dwell.illumination.gain;
-        self.compiled.amplifier.convert(gain, current_a).ok_or(BoardFault::Detector)
+        self.compiled.drawn.amplifier.convert(gain, current_a).ok_or(BoardFault::Detector)
     }
 
     fn fault(&mut self, _now: Instant) -> Option<BoardFault> {

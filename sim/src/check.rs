@@ -1,16 +1,19 @@
-//! Whether a rig as stated, and the terms, are such as there can be. It does not know the scene.
+//! Whether a rig as stated, and the terms, are such as there can be, and whether scene and rig go
+//! together. It does not know any effect.
 
 use firmware_protocol::AXES_MAX;
 
 use crate::simulated::AXIS_NAMES;
-use crate::{CompileError, Nominal, Simulated, Terms};
+use crate::{CompileError, Nominal, Scene, Simulated, Terms};
 
-/// Refuses numbers that no rig and no plan has.
+/// Refuses numbers that no rig and no plan has, and what does not go together.
 pub(crate) fn check(
+    scene: &Scene,
     nominal: &Nominal,
     simulated: &Simulated,
     terms: &Terms,
 ) -> Result<(), CompileError> {
+    check_together(scene, nominal, simulated)?;
     check_terms(terms)?;
     let channels: [u8; 4] = core::array::from_fn(|i| nominal.axes[i].channel);
     let mut sorted = channels;
@@ -53,6 +56,23 @@ pub(crate) fn check(
     positive("gain ranges".into(), detector.gains.len() as f64)?;
     for gain in &detector.gains {
         positive(format!("full scale of {}", gain.name), gain.full_scale_a)?;
+    }
+    Ok(())
+}
+
+fn check_together(
+    scene: &Scene,
+    nominal: &Nominal,
+    simulated: &Simulated,
+) -> Result<(), CompileError> {
+    if scene.quantity() != nominal.quantity {
+        let (scene, rig) = (scene.quantity(), nominal.quantity);
+        return Err(CompileError::Quantity { scene, rig });
+    }
+    let has_stray = simulated.detector.stray_light_fraction_of_flux != 0.0;
+    if has_stray && !scene.surfaces().is_empty() {
+        let what = "simulated.stray_light_fraction_of_flux of a scene with surfaces";
+        return Err(CompileError::Unsupported(what.to_owned()));
     }
     Ok(())
 }

@@ -66,13 +66,13 @@ impl Sampler {
 
     /// The light's current, amperes.
     pub fn photocurrent_a(&self, joints: [f64; 4]) -> f64 {
-        let axis = self.compiled.kinematics.seen(joints);
-        self.compiled.optics.radiance(&axis) * self.compiled.current_per_radiance
+        let axis = self.compiled.drawn.kinematics.seen(joints);
+        self.compiled.optics.radiance(&axis) * self.compiled.drawn.current_per_radiance
     }
 
     fn pass(&mut self, light_a: f64) -> Option<i32> {
         self.now = self.now + Duration::from_micros(self.reading_us);
         let current_a = self.stages.pass(Interval::ending(self.now, self.reading_s), light_a);
-        self.compiled.amplifier.convert(self.gain, current_a)
+        self.compiled.drawn.amplifier.convert(self.gain, current_a)
     }
 }

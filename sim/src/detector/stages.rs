@@ -15,7 +15,7 @@ use crate::stage::Stages;
 pub(crate) fn stray_light(compiled: &Compiled, stages: &mut Stages) {
     let fraction = compiled.simulated.detector.stray_light_fraction_of_flux;
     if compiled.chosen.has(name::STRAY_LIGHT) {
-        stages.push(StrayLight::new(fraction, compiled.scene.flux(), compiled.responsivity));
+        stages.push(StrayLight::new(fraction, compiled.scene.flux(), compiled.drawn.responsivity));
     }
 }
 
@@ -23,7 +23,7 @@ pub(crate) fn stray_light(compiled: &Compiled, stages: &mut Stages) {
 pub(crate) fn stages(compiled: &Compiled, stages: &mut Stages) {
     let Compiled { nominal, simulated, seed, chosen, .. } = compiled;
     let (d, flaws, seed) = (&nominal.detector, &simulated.detector, *seed);
-    let full_scales_a = compiled.amplifier.full_scales_a();
+    let full_scales_a = compiled.drawn.amplifier.full_scales_a();
     if chosen.has(name::DETECTOR_DRIFT) {
         stages.push(Drifting::new(&flaws.drift, seed));
     }

@@ -1,0 +1,63 @@
+//! From a scene, a rig as stated and the terms of a plan to a rig as it is: every effect weighed,
+//! what is chosen turned into stages, every uncertain number drawn once, and a row written for
+//! each effect, in or out.
+//!
+//! How a module takes part: it offers its candidates for a [`Setting`] (`candidates`), and builds
+//! what was [`Chosen`](crate::effect::Chosen) of them. The order of the rows is that in which light
+//! and counts meet them.
+
+mod compiled;
+mod drawn;
+mod error;
+mod setting;
+
+use std::sync::Arc;
+
+pub use compiled::Compiled;
+pub use error::CompileError;
+
+pub(crate) use setting::Setting;
+
+use crate::check::check;
+use crate::effect::decide;
+use crate::optics::Light;
+use crate::{Nominal, Scene, Simulated, Terms, detector, light, mechanics, time};
+use drawn::Drawn;
+
+/// Compiles a rig. The same arguments give the same rig, to the last bit.
+pub fn compile(
+    scene: Scene,
+    nominal: Nominal,
+    simulated: Simulated,
+    terms: &Terms,
+) -> Result<Compiled, CompileError> {
+    check(&scene, &nominal, &simulated, terms)?;
+    let scene = Arc::new(scene);
+    let mut setting = Setting::new(&scene, &nominal, &simulated, terms)?;
+    let tolerance = setting.tolerance;
+    let mut beam = Light::of(&setting).map_err(CompileError::Beam)?;
+    let mut candidates = core::mem::take(&mut beam.candidates);
+    candidates.extend(light::candidates(&setting)?);
+    candidates.extend(mechanics::candidates(&setting));
+    candidates.extend(time::candidates(&setting));
+    candidates.extend(detector::candidates(&setting));
+    let chosen = decide(candidates, tolerance, terms)?;
+    let is_in = |name: &str| chosen.has(name);
+    setting.field = light::field(&scene, Some(nominal.detector.distance_m), &is_in)?;
+    let (region, optics) = (setting.region, beam.optics(&setting, &chosen));
+    let (seen, field) = (Arc::clone(&setting.field), light::field(&scene, None, &is_in)?);
+    let (seed, drawn) = (terms.seed, Drawn::new(&nominal, &simulated, terms.seed, &chosen)?);
+    Ok(Compiled {
+        scene,
+        nominal,
+        simulated,
+        seed,
+        drawn,
+        seen,
+        field,
+        optics,
+        chosen,
+        region,
+        tolerance,
+    })
+}
