@@ -252,7 +252,7 @@ impl Fit {
     }
 
     /// The one door from coefficients to a number with its uncertainty.
-    fn estimate(&self, functional: &[f64]) -> Estimate {
+    pub(crate) fn estimate(&self, functional: &[f64]) -> Estimate {
         let independent = self.independent_variance(functional);
         let common = self.common_shifts(functional).map(|(_, shift)| shift * shift);
         Estimate {
@@ -262,7 +262,7 @@ impl Fit {
         }
     }
 
-    fn budget(&self, functional: &[f64]) -> Vec<Contribution> {
+    pub(crate) fn budget(&self, functional: &[f64]) -> Vec<Contribution> {
         let independent = self.independent_variance(functional).sqrt();
         let first = Contribution { name: INDEPENDENT.to_owned(), u: independent };
         let common = self.common_shifts(functional);

@@ -1,0 +1,119 @@
+//! Anything linear in the field: a weighted sum of radiances along rays, as one row over the
+//! coefficients. A quadrature of L over a receiver, a cone or a cell is such a sum, and here it
+//! gets its value and its uncertainty with all correlations. Knows no basis: the rows come from it.
+
+use crate::{Contribution, Estimate, Fit, Ray};
+
+/// A linear functional of the field: the value is the row times the coefficients. It belongs to
+/// the fit that made it, and to others of the same basis and region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Functional {
+    row: Vec<f64>,
+}
+
+impl Functional {
+    /// One number a coefficient, in the unit of the weights.
+    pub fn row(&self) -> &[f64] {
+        &self.row
+    }
+
+    /// The functional times a number: a unit, an area, a share.
+    #[must_use]
+    pub fn times(mut self, factor: f64) -> Self {
+        self.row.iter_mut().for_each(|element| *element *= factor);
+        self
+    }
+
+    /// This functional and `factor` times another one of the same fit: differences, means, and the
+    /// first order of what isn't linear.
+    ///
+    /// # Panics
+    /// If the two have different numbers of coefficients, and so never belonged to one fit.
+    #[must_use]
+    pub fn plus(mut self, factor: f64, other: &Self) -> Self {
+        assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
+        self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
+        self
+    }
+}
+
+impl Fit {
+    /// The functional Σ wᵢ L(rayᵢ). No ray at all makes the functional that is 0. Rays beyond the
+    /// region or its cone are extrapolated; u tells how little is known there.
+    ///
+    /// Whatever is linear in L is such a sum, by a quadrature rule's nodes and weights:
+    ///
+    /// ```
+    /// use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
+    /// use std::f64::consts::PI;
+    ///
+    /// // A Lambertian field of 100 W·m⁻²·sr⁻¹, its responsivity known to 2 %.
+    /// let ray = |theta_rad: f64, phi_rad: f64| Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad };
+    /// let noise = Noise::Fixed { variance: 0.01 };
+    /// let at = |i: u32| ray(f64::from(i % 8) * 0.2, f64::from(i / 8) * 2.1);
+    /// let samples: Vec<Sample> =
+    ///     (0..24).map(|i| Sample { ray: at(i), value: 100.0, noise }).collect();
+    /// let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+    /// let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+    /// let common = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
+    /// let field = fit::fit(&samples, &region, basis, &[common])?;
+    ///
+    /// // The exitance into a cone of half angle α is π L sin²α. With s = sin²θ the projected solid
+    /// // angle is dφ ds / 2: the mid-point rule over s and φ.
+    /// let sin2 = 0.25;
+    /// let (rings, spokes) = (32, 12);
+    /// let nodes = (0..rings * spokes).map(|k| {
+    ///     let s = sin2 * (f64::from(k / spokes) + 0.5) / f64::from(rings);
+    ///     let phi_rad = 2.0 * PI * f64::from(k % spokes) / f64::from(spokes);
+    ///     (ray(s.sqrt().asin(), phi_rad), PI * sin2 / f64::from(rings * spokes))
+    /// });
+    /// let cone = field.weighted_rays(nodes);
+    ///
+    /// let exitance = field.of(&cone);
+    /// assert!((exitance.value - 100.0 * PI * sin2).abs() < 1e-10);
+    /// let scale = 0.02 * 100.0 * PI * sin2;
+    /// assert!((exitance.u - exitance.u_independent.hypot(scale)).abs() < 1e-10);
+    /// assert_eq!(field.contributions_of(&cone)[1].name, "responsivity");
+    /// assert!((field.contributions_of(&cone)[1].u - scale).abs() < 1e-10);
+    /// # Ok::<(), fit::FitError>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If a weight or a number of a ray isn't finite: quadratures have none such.
+    pub fn weighted_rays(&self, rays: impl IntoIterator<Item = (Ray, f64)>) -> Functional {
+        let basis = self.functions();
+        let mut scratch = basis.scratch();
+        let mut along = vec![0.0; basis.len()];
+        let mut row = vec![0.0; basis.len()];
+        for (ray, weight) in rays {
+            let Ray { x_m, y_m, theta_rad, phi_rad } = ray;
+            let is_finite = [x_m, y_m, theta_rad, phi_rad, weight].into_iter().all(f64::is_finite);
+            assert!(is_finite, "not finite: {ray:?} of weight {weight}");
+            basis.row(&ray, &mut scratch, &mut along);
+            row.iter_mut().zip(&along).for_each(|(sum, element)| *sum += weight * element);
+        }
+        Functional { row }
+    }
+
+    /// The functional's value with its uncertainty, in the values' unit times the weights'.
+    ///
+    /// # Panics
+    /// If the functional has another number of coefficients, and so is of another fit.
+    pub fn of(&self, functional: &Functional) -> Estimate {
+        self.demand_own(functional);
+        self.estimate(&functional.row)
+    }
+
+    /// The functional's uncertainty by source, the independent part first.
+    ///
+    /// # Panics
+    /// As [`of`](Self::of).
+    pub fn contributions_of(&self, functional: &Functional) -> Vec<Contribution> {
+        self.demand_own(functional);
+        self.budget(&functional.row)
+    }
+
+    fn demand_own(&self, functional: &Functional) {
+        assert_eq!(functional.row.len(), self.coefficients().len(), "a functional of another fit");
+    }
+}
