@@ -136,7 +136,7 @@ fn refusal(rays: &[Ray], grid: &Grid, basis: &Basis) -> FitError {
         return FitError::OutOfRange;
     };
     let mut by_share: Vec<(usize, f64)> =
-        spectrum.undetermined_shares().into_iter().enumerate().collect();
+        spectrum.undetermined_shares().iter().copied().enumerate().collect();
     by_share.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let involved = by_share.iter().take(NAMES_MAX).filter(|(_, share)| *share > SHARE_MIN);
     FitError::Undetermined {

@@ -1,10 +1,14 @@
 //! The streamed orthogonal factorisation: rows come in blocks and leave a triangle behind that
-//! holds all that least squares needs, in memory that doesn't grow with the number of rows.
+//! holds all that least squares needs, in memory that doesn't grow with the number of rows: three
+//! times the triangle's square at most, and blocks of 512 rows.
 //!
 //! A block B is taken in by factoring [R; B] and keeping the new R (Golub & Van Loan 2013, Matrix
-//! Computations, §6.5.3 and §5.2.2 for the factorisation; Demmel et al. 2012, "Communication-optimal
-//! parallel and sequential QR and LU", for the tree of such steps). The order in which rows come
-//! changes R by rounding alone.
+//! Computations, §6.5.3 and §5.2.2; Demmel et al. 2012, "Communication-optimal parallel and
+//! sequential QR and LU", for the tree of such steps). The first blocks are taken in by reflections
+//! ([`reflect`]). Once R is a measure of what comes, a block is taken in by the normal equations of
+//! B R⁻¹ ([`gram`]), in about half the time; that those are well conditioned is checked for every
+//! block, and reflections do what fails the check. The order in which rows come changes R by
+//! rounding alone.
 //!
 //! ```
 //! use fit::triangle::Triangle;
@@ -20,11 +24,14 @@
 //! assert!((solution.residual_squares(0) - 0.06).abs() < 1e-14);
 //! ```
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::no_pivoting::factor;
-use faer::linalg::svd;
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Mat, MatRef, Par, Spec};
+pub use solution::{Solution, Spectrum};
+
+use faer::{Mat, MatMut, MatRef};
+use gram::Gram;
+
+mod gram;
+mod reflect;
+mod solution;
 
 /// R of all rows [a | b] taken in so far: `unknowns` columns a, then `sides` right-hand sides b.
 #[derive(Debug, Clone)]
@@ -32,8 +39,10 @@ pub struct Triangle {
     unknowns: usize,
     sides: usize,
     rows: u64,
-    /// R on top, zeros below its diagonal; room for a block of rows under it.
-    work: Mat<f64>,
+    /// Zeros below its diagonal.
+    r: Mat<f64>,
+    /// What was taken in since `r` was renewed; made when it is first of use.
+    gram: Option<Gram>,
     /// The rows that wait for the next factorisation, one after the other.
     waiting: Vec<f64>,
 }
@@ -42,10 +51,8 @@ impl Triangle {
     /// An empty triangle.
     pub fn new(unknowns: usize, sides: usize) -> Self {
         let columns = unknowns + sides;
-        let block = (BLOCK_ROWS_PER_COLUMN * columns).max(BLOCK_ROWS_MIN);
-        let work = Mat::zeros(columns + block, columns);
-        let waiting = Vec::with_capacity(block * columns);
-        Self { unknowns, sides, rows: 0, work, waiting }
+        let r = Mat::zeros(columns, columns);
+        Self { unknowns, sides, rows: 0, r, gram: None, waiting: Vec::new() }
     }
 
     /// Takes in one row: `unknowns` numbers, then one for each right-hand side, all already
@@ -57,8 +64,8 @@ impl Triangle {
         assert_eq!(row.len(), self.columns(), "a row has as many numbers as there are columns");
         self.waiting.extend_from_slice(row);
         self.rows += 1;
-        if self.waiting.len() == (self.work.nrows() - self.columns()) * self.columns() {
-            self.factor();
+        if self.waiting.len() == BLOCK_ROWS * self.columns() {
+            self.take_in();
         }
     }
 
@@ -69,12 +76,12 @@ impl Triangle {
     pub fn merge(&mut self, other: &Self) {
         assert_eq!((self.unknowns, self.sides), (other.unknowns, other.sides));
         let mut other = other.clone();
-        other.factor();
+        other.settle();
         let rows = self.rows + other.rows;
         let mut row = vec![0.0; self.columns()];
         for i in 0..self.columns() {
             for (j, value) in row.iter_mut().enumerate() {
-                *value = if j < i { 0.0 } else { other.work[(i, j)] };
+                *value = if j < i { 0.0 } else { other.r[(i, j)] };
             }
             self.absorb(&row);
         }
@@ -90,162 +97,48 @@ impl Triangle {
     ///
     /// Returns `None` if the numbers left the range of f64.
     pub fn solve(mut self) -> Option<Solution> {
-        self.factor();
-        let upper = |i: usize, j: usize| if i <= j { self.work[(i, j)] } else { 0.0 };
-        let r = Mat::from_fn(self.unknowns, self.unknowns, upper);
-        let sides = Mat::from_fn(self.unknowns, self.sides, |i, j| upper(i, self.unknowns + j));
-        let residual = |side: usize| {
-            let column = self.unknowns + side;
-            (self.unknowns..=column).map(|i| upper(i, column).powi(2)).sum()
-        };
-        let residual_squares: Vec<f64> = (0..self.sides).map(residual).collect();
-        let is_finite = residual_squares.iter().all(|square| square.is_finite())
-            && r.col_iter().all(|column| column.norm_l2().is_finite());
-        is_finite.then_some(Solution { r, sides, residual_squares })
+        self.settle();
+        Solution::of(self.r, self.unknowns)
     }
 
     fn columns(&self) -> usize {
         self.unknowns + self.sides
     }
 
-    /// Factors [R; waiting rows] and keeps the upper triangle.
-    fn factor(&mut self) {
-        let columns = self.columns();
-        if self.waiting.is_empty() {
+    /// Takes in what waits and leaves all of it in `r`.
+    fn settle(&mut self) {
+        self.take_in();
+        if let Some(mut gram) = self.gram.take() {
+            gram.fold(&mut self.r);
+        }
+        self.waiting = Vec::new();
+    }
+
+    fn take_in(&mut self) {
+        let (columns, rows) = (self.columns(), self.waiting.len() / self.columns());
+        if rows == 0 {
             return;
         }
-        let rows = columns + self.waiting.len() / columns;
-        for j in 0..columns {
-            let below = self.work.col_as_slice_mut(j)[columns..rows].iter_mut();
-            for (to, row) in below.zip(self.waiting.chunks_exact(columns)) {
-                *to = row[j];
-            }
+        let mut copy = self.waiting.clone();
+        let gram = self.gram.get_or_insert_with(|| Gram::new(self.unknowns, self.sides));
+        let added =
+            gram.add(&self.r, MatMut::from_column_major_slice_mut(&mut copy, columns, rows));
+        if !added || gram.is_full() {
+            gram.fold(&mut self.r);
+        }
+        if !added {
+            let waiting = MatRef::from_row_major_slice(&self.waiting, rows, columns);
+            let mut block = MatMut::from_column_major_slice_mut(&mut copy, rows, columns);
+            block.copy_from(waiting);
+            reflect::absorb(&mut self.r, block);
         }
         self.waiting.clear();
-        let block = factor::recommended_block_size::<f64>(rows, columns);
-        let scratch =
-            factor::qr_in_place_scratch::<f64>(rows, columns, block, Par::Seq, Spec::default());
-        factor::qr_in_place(
-            self.work.as_mut().get_mut(..rows, ..),
-            Mat::zeros(block, columns).as_mut(),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(scratch)),
-            Spec::default(),
-        );
-        for j in 0..columns {
-            self.work.col_as_slice_mut(j)[j + 1..rows].fill(0.0);
-        }
     }
 }
 
-/// What a closed [`Triangle`] determines.
-#[derive(Debug, Clone)]
-pub struct Solution {
-    r: Mat<f64>,
-    sides: Mat<f64>,
-    residual_squares: Vec<f64>,
-}
-
-impl Solution {
-    /// How many unknowns there are.
-    #[expect(clippy::len_without_is_empty, reason = "a fit without unknowns is never asked for")]
-    pub fn len(&self) -> usize {
-        self.r.ncols()
-    }
-
-    /// What is determined, and how well. Returns `None` if the decomposition doesn't converge.
-    pub fn spectrum(&self) -> Option<Spectrum> {
-        Spectrum::of(self.r.as_ref())
-    }
-
-    /// The unknowns that fit a right-hand side best. Meaningful at full rank.
-    pub fn unknowns(&self, side: usize) -> Vec<f64> {
-        let mut x = self.sides.as_ref().subcols(side, 1).to_owned();
-        solve_upper_triangular_in_place(self.r.as_ref(), x.as_mut(), Par::Seq);
-        x.col(0).iter().copied().collect()
-    }
-
-    /// The sum of squared residuals of a right-hand side.
-    pub fn residual_squares(&self, side: usize) -> f64 {
-        self.residual_squares[side]
-    }
-
-    /// S = R⁻¹, upper triangular, so that the unknowns' covariance is S Sᵀ for rows of unit
-    /// variance; packed by columns. Meaningful at full rank.
-    pub fn inverse(&self) -> Vec<f64> {
-        let p = self.r.nrows();
-        let mut inverse = Mat::<f64>::identity(p, p);
-        solve_upper_triangular_in_place(self.r.as_ref(), inverse.as_mut(), Par::Seq);
-        (0..p).flat_map(|j| (0..=j).map(move |i| (i, j))).map(|at| inverse[at]).collect()
-    }
-}
-
-/// Singular values of R with its columns scaled to length 1, and the directions of the small ones.
-#[derive(Debug, Clone)]
-pub struct Spectrum {
-    values: Vec<f64>,
-    right: Mat<f64>,
-}
-
-impl Spectrum {
-    fn of(r: MatRef<'_, f64>) -> Option<Self> {
-        let p = r.ncols();
-        let lengths: Vec<f64> = r.col_iter().map(|column| column.norm_l2()).collect();
-        let divisor = |length: f64| if length > 0.0 { length } else { 1.0 };
-        let scaled = Mat::from_fn(p, p, |i, j| r[(i, j)] / divisor(lengths[j]));
-        let mut values = faer::diag::Diag::<f64>::zeros(p);
-        let mut right = Mat::zeros(p, p);
-        let vectors = svd::ComputeSvdVectors::Full;
-        let scratch = svd::svd_scratch::<f64>(
-            p,
-            p,
-            svd::ComputeSvdVectors::No,
-            vectors,
-            Par::Seq,
-            Spec::default(),
-        );
-        svd::svd(
-            scaled.as_ref(),
-            values.as_mut(),
-            None,
-            Some(right.as_mut()),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(scratch)),
-            Spec::default(),
-        )
-        .ok()?;
-        Some(Self { values: values.column_vector().iter().copied().collect(), right })
-    }
-
-    /// Largest over smallest singular value; infinite when a column is zero.
-    pub fn condition(&self) -> f64 {
-        match (self.values.first(), self.values.last()) {
-            (Some(largest), Some(smallest)) => largest / smallest,
-            _ => 1.0,
-        }
-    }
-
-    /// How many combinations of unknowns are determined.
-    pub fn rank(&self) -> usize {
-        let largest = self.values.first().copied().unwrap_or(0.0);
-        self.values.iter().filter(|value| **value > RANK_TOLERANCE * largest).count()
-    }
-
-    /// The unknowns' shares, from 0 to 1, in what is not determined: all 0 at full rank.
-    pub fn undetermined_shares(&self) -> Vec<f64> {
-        let p = self.right.nrows();
-        let share = |k: usize| (self.rank()..p).map(|i| self.right[(k, i)].powi(2)).sum();
-        (0..p).map(share).collect()
-    }
-}
-
-/// A block of this many rows for each column costs a quarter more than one block of all rows.
-const BLOCK_ROWS_PER_COLUMN: usize = 4;
-/// Fewest rows of a block: below it the factorisation's overhead shows.
-const BLOCK_ROWS_MIN: usize = 64;
-/// A combination is determined when its singular value is above this share of the largest one.
-/// The factorisation itself takes a column for dependent below about 1e-11 of its length.
-const RANK_TOLERANCE: f64 = 1e-10;
+/// Rows that are taken in at a time: fewer leave the products too thin to be fast, more cost
+/// memory and gain nothing.
+const BLOCK_ROWS: usize = 512;
 
 #[cfg(test)]
 mod tests {
@@ -324,6 +217,58 @@ mod tests {
         assert!((merged.residual_squares(0) / whole.residual_squares(0) - 1.0).abs() < 1e-12);
         let (a, b) = (merged.spectrum().unwrap(), whole.spectrum().unwrap());
         assert!((a.condition() / b.condition() - 1.0).abs() < 1e-12);
+    }
+
+    /// Rows whose later columns are all but silent in the first `quiet` rows.
+    fn late_rows(count: usize, quiet: usize) -> Vec<Vec<f64>> {
+        let mut rows = rows(count, 12);
+        for row in &mut rows[..quiet] {
+            row[8..12].iter_mut().for_each(|value| *value *= 1e-7);
+            row[13] = (0..12).map(|j| (j + 1) as f64 * row[j]).sum();
+        }
+        rows
+    }
+
+    #[test]
+    fn columns_that_come_late_are_solved_as_well_as_the_others() {
+        for quiet in [1, 511, 1500, 3900] {
+            let solution = of(&late_rows(4000, quiet), 12).solve().unwrap();
+            let expected: Vec<f64> = (1..=12).map(f64::from).collect();
+            assert_close(&solution.unknowns(1), &expected, 1e-12);
+            assert!(solution.residual_squares(1).sqrt() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn an_ill_conditioned_stream_errs_as_reflections_do() {
+        for (nearly, allowed) in [(1e-4, 1e-10), (1e-6, 1e-8), (1e-8, 1e-6)] {
+            let mut rows = rows(5000, 8);
+            for row in &mut rows {
+                row[7] = row[2] + nearly * row[7];
+                row[9] = (0..8).map(|j| (j + 1) as f64 * row[j]).sum();
+            }
+            let solution = of(&rows, 8).solve().unwrap();
+            let condition = solution.spectrum().unwrap().condition();
+            assert!(condition * nearly > 0.5 && condition * nearly < 5.0, "{condition:e}");
+            let expected: Vec<f64> = (1..=8).map(f64::from).collect();
+            assert_close(&solution.unknowns(1), &expected, allowed);
+        }
+    }
+
+    #[test]
+    fn a_long_stream_keeps_the_residual_of_a_short_one() {
+        let rows = rows(4000, 20);
+        let mut triangle = Triangle::new(20, 2);
+        for _ in 0..25 {
+            for row in &rows {
+                triangle.absorb(row);
+            }
+        }
+        let long = triangle.solve().unwrap();
+        let short = of(&rows, 20).solve().unwrap();
+        let ratio = long.residual_squares(0) / short.residual_squares(0);
+        assert!((ratio / 25.0 - 1.0).abs() < 1e-12, "{ratio}");
+        assert_close(&long.unknowns(0), &short.unknowns(0), 1e-12);
     }
 
     #[test]

@@ -1,0 +1,140 @@
+//! What the rows of a closed triangle determine, how well, and what they leave open.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::svd;
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::{Mat, MatRef, Par, Spec};
+
+/// What a closed [`Triangle`](super::Triangle) determines.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The triangle of unknowns and right-hand sides.
+    whole: Mat<f64>,
+    unknowns: usize,
+}
+
+impl Solution {
+    /// Takes a triangle up; `None` if it holds numbers that are not finite.
+    pub(super) fn of(whole: Mat<f64>, unknowns: usize) -> Option<Self> {
+        let is_finite = whole.col_iter().all(|column| column.norm_l2().is_finite());
+        is_finite.then_some(Self { whole, unknowns })
+    }
+
+    /// How many unknowns there are.
+    #[expect(clippy::len_without_is_empty, reason = "a fit without unknowns is never asked for")]
+    pub fn len(&self) -> usize {
+        self.unknowns
+    }
+
+    /// What is determined, and how well. Returns `None` if the decomposition doesn't converge.
+    pub fn spectrum(&self) -> Option<Spectrum> {
+        Spectrum::of(self.r())
+    }
+
+    /// The unknowns that fit a right-hand side best. Meaningful at full rank.
+    pub fn unknowns(&self, side: usize) -> Vec<f64> {
+        let sides = self.whole.as_ref().get(..self.unknowns, self.unknowns..);
+        let mut x = sides.subcols(side, 1).to_owned();
+        solve_upper_triangular_in_place(self.r(), x.as_mut(), Par::Seq);
+        x.col(0).iter().copied().collect()
+    }
+
+    /// The sum of squared residuals of a right-hand side.
+    pub fn residual_squares(&self, side: usize) -> f64 {
+        let column = self.unknowns + side;
+        (self.unknowns..=column).map(|i| self.whole[(i, column)].powi(2)).sum()
+    }
+
+    /// S = R⁻¹, upper triangular, so that the unknowns' covariance is S Sᵀ for rows of unit
+    /// variance; packed by columns. Meaningful at full rank.
+    pub fn inverse(&self) -> Vec<f64> {
+        let p = self.unknowns;
+        let mut inverse = Mat::<f64>::identity(p, p);
+        solve_upper_triangular_in_place(self.r(), inverse.as_mut(), Par::Seq);
+        (0..p).flat_map(|j| (0..=j).map(move |i| (i, j))).map(|at| inverse[at]).collect()
+    }
+
+    fn r(&self) -> MatRef<'_, f64> {
+        self.whole.as_ref().get(..self.unknowns, ..self.unknowns)
+    }
+}
+
+/// Singular values of R with its columns scaled to length 1, and the directions of the small ones.
+#[derive(Debug, Clone)]
+pub struct Spectrum {
+    values: Vec<f64>,
+    /// The unknowns' shares in the combinations that are not determined.
+    undetermined_shares: Vec<f64>,
+}
+
+impl Spectrum {
+    fn of(r: MatRef<'_, f64>) -> Option<Self> {
+        let p = r.ncols();
+        let lengths: Vec<f64> = r.col_iter().map(|column| column.norm_l2()).collect();
+        let divisor = |length: f64| if length > 0.0 { length } else { 1.0 };
+        let scaled = Mat::from_fn(p, p, |i, j| r[(i, j)] / divisor(lengths[j]));
+        let values = singular_values(&scaled, None)?;
+        let mut spectrum = Self { values, undetermined_shares: vec![0.0; p] };
+        let rank = spectrum.rank();
+        // The directions cost another p² of memory, and are of interest only where some are open.
+        if rank < p {
+            let mut right = Mat::zeros(p, p);
+            singular_values(&scaled, Some(&mut right))?;
+            let share = |k: usize| (rank..p).map(|i| right[(k, i)].powi(2)).sum();
+            spectrum.undetermined_shares = (0..p).map(share).collect();
+        }
+        Some(spectrum)
+    }
+
+    /// Largest over smallest singular value; infinite when a column is zero.
+    pub fn condition(&self) -> f64 {
+        match (self.values.first(), self.values.last()) {
+            (Some(largest), Some(smallest)) => largest / smallest,
+            _ => 1.0,
+        }
+    }
+
+    /// How many combinations of unknowns are determined.
+    pub fn rank(&self) -> usize {
+        let largest = self.values.first().copied().unwrap_or(0.0);
+        self.values.iter().filter(|value| **value > RANK_TOLERANCE * largest).count()
+    }
+
+    /// The unknowns' shares, from 0 to 1, in what is not determined: all 0 at full rank.
+    pub fn undetermined_shares(&self) -> &[f64] {
+        &self.undetermined_shares
+    }
+}
+
+/// The singular values of a square matrix, the largest first, and its right singular vectors if
+/// there is room for them. `None` if the decomposition doesn't converge.
+fn singular_values(matrix: &Mat<f64>, right: Option<&mut Mat<f64>>) -> Option<Vec<f64>> {
+    let p = matrix.ncols();
+    let vectors = |wanted| {
+        if wanted { svd::ComputeSvdVectors::Full } else { svd::ComputeSvdVectors::No }
+    };
+    let scratch = svd::svd_scratch::<f64>(
+        p,
+        p,
+        vectors(false),
+        vectors(right.is_some()),
+        Par::Seq,
+        Spec::default(),
+    );
+    let mut values = faer::diag::Diag::<f64>::zeros(p);
+    svd::svd(
+        matrix.as_ref(),
+        values.as_mut(),
+        None,
+        right.map(Mat::as_mut),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Spec::default(),
+    )
+    .ok()?;
+    Some(values.column_vector().iter().copied().collect())
+}
+
+/// A combination is determined when its singular value is above this share of the largest one.
+/// The factorisation itself takes a column for dependent below about 1e-11 of its length.
+const RANK_TOLERANCE: f64 = 1e-10;
