@@ -286,7 +286,7 @@ impl Fit {
 }
 
 impl Estimate {
-    fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self {
             value: self.value * factor,
             u: self.u * factor.abs(),

@@ -2,6 +2,7 @@
 //! coefficients. A quadrature of L over a receiver, a cone or a cell is such a sum, and here it
 //! gets its value and its uncertainty with all correlations. Knows no basis: the rows come from it.
 
+use crate::basis::dot;
 use crate::{Contribution, Estimate, Fit, Ray};
 
 /// A linear functional of the field: the value is the row times the coefficients. It belongs to
@@ -28,12 +29,20 @@ impl Functional {
     /// first order of what isn't linear.
     ///
     /// # Panics
-    /// If the two have different numbers of coefficients, and so never belonged to one fit.
+    /// As [`add`](Self::add).
     #[must_use]
     pub fn plus(mut self, factor: f64, other: &Self) -> Self {
+        self.add(factor, other);
+        self
+    }
+
+    /// Adds `factor` times another functional of the same fit.
+    ///
+    /// # Panics
+    /// If the two have different numbers of coefficients, and so never belonged to one fit.
+    pub fn add(&mut self, factor: f64, other: &Self) {
         assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
         self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
-        self
     }
 }
 
@@ -95,6 +104,12 @@ impl Fit {
         Functional { row }
     }
 
+    /// The mean of the radiance over the region in a direction, as a functional. Times the region's
+    /// area and cos θ it is the intensity.
+    pub fn mean_towards(&self, theta_rad: f64, phi_rad: f64) -> Functional {
+        Functional { row: self.functions().mean_over_region(theta_rad, phi_rad) }
+    }
+
     /// The functional's value with its uncertainty, in the values' unit times the weights'.
     ///
     /// # Panics
@@ -102,6 +117,12 @@ impl Fit {
     pub fn of(&self, functional: &Functional) -> Estimate {
         self.demand_own(functional);
         self.estimate(&functional.row)
+    }
+
+    /// The functional's value alone: for searches.
+    pub(crate) fn of_value(&self, functional: &Functional) -> f64 {
+        self.demand_own(functional);
+        dot(&functional.row, self.coefficients())
     }
 
     /// The functional's uncertainty by source, the independent part first.

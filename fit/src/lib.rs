@@ -56,6 +56,7 @@ pub use undetermined::Cause;
 mod basis;
 mod beam;
 mod check;
+pub mod derive;
 mod error;
 mod fitted;
 mod functional;

@@ -4,7 +4,8 @@
 #[allow(dead_code)]
 mod scenes;
 
-use fit::{BasisSpec, Common, Fit, Noise, Parts, Ray, Shift};
+use fit::{BasisSpec, Common, Fit, Noise, Ray, Shift};
+use scenes::disturbed::disturbed;
 use scenes::{Die, REGION, exact, scaled, spread_rays};
 use std::f64::consts::{PI, TAU};
 
@@ -67,24 +68,6 @@ fn the_uncertainty_is_the_covariances_and_the_budget_adds_up_to_it() {
     assert!((squares / variance - 1.0).abs() < 1e-10);
     let names: Vec<&str> = budget.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["independent", "responsivity", "dark"]);
-}
-
-/// Coefficients drawn from the covariance, by nothing but the stored parts.
-fn disturbed(parts: &Parts, die: &mut Die) -> Fit {
-    let mut parts = parts.clone();
-    for j in 0..parts.coefficients.len() {
-        let z = die.normal();
-        for i in 0..=j {
-            parts.coefficients[i] += parts.factor[j * (j + 1) / 2 + i] * z;
-        }
-    }
-    for common in parts.shifts.clone() {
-        let z = die.normal();
-        for (c, shift) in parts.coefficients.iter_mut().zip(&common.shift) {
-            *c += z * shift;
-        }
-    }
-    Fit::from_parts(parts).unwrap()
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Rays, fields and noise that the tests share. Everything is drawn from a seed.
 
+pub(crate) mod disturbed;
+
 use fit::{Noise, Ray, Region, Sample};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
