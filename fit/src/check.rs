@@ -2,18 +2,19 @@
 
 use crate::sample::HORIZON_RAD;
 use crate::weights::has_unknown;
-use crate::{BasisSpec, Common, FitError, Noise, Region, Sample};
+use crate::{Common, FitError, Noise, Penalised, Region, Sample};
 
 pub(crate) fn check(
     samples: &[Sample],
     region: &Region,
-    basis: BasisSpec,
+    model: Penalised,
     common: &[Common],
 ) -> Result<(), FitError> {
     if !region.is_sound() {
         return Err(FitError::Region);
     }
-    let coefficients = basis.checked_len()?;
+    let coefficients = model.basis.checked_len()?;
+    model.penalty.check()?;
     if samples.is_empty() {
         return Err(FitError::Empty);
     }
@@ -24,6 +25,8 @@ pub(crate) fn check(
         return Err(FitError::Common { name: wrong.name.clone() });
     }
     let readings = samples.len();
+    // What the readings leave open a penalty decides.
+    let coefficients = if model.penalty.is_none() { coefficients } else { 1 };
     if readings < coefficients {
         return Err(FitError::FewerReadingsThanCoefficients { readings, coefficients });
     }

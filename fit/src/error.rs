@@ -1,6 +1,7 @@
 //! Why a fit is refused, each with its own sentence. Indices count the samples from 0, as they
 //! were handed in.
 
+use crate::Penalty;
 use crate::undetermined::Cause;
 use std::fmt;
 
@@ -19,6 +20,16 @@ pub enum FitError {
         coefficients: usize,
         /// Most that are taken.
         coefficients_max: usize,
+    },
+    /// A basis out of its range: harmonics beyond degree 200, say.
+    Basis {
+        /// Which functions.
+        kind: &'static str,
+    },
+    /// A penalty whose strength is negative or not finite, or whose power the basis doesn't know.
+    Penalty {
+        /// As handed in.
+        penalty: Penalty,
     },
     /// A number of a sample is NaN or infinite. Leave the sample out, or mend its source.
     NotFinite {
@@ -113,6 +124,14 @@ impl fmt::Display for FitError {
             Self::TooLarge { coefficients, coefficients_max } => {
                 write!(f, "{coefficients} coefficients are more than {coefficients_max}")
             }
+            Self::Basis { kind } => {
+                write!(f, "basis `{kind}`: its degree or spans are beyond what it is good for")
+            }
+            Self::Penalty { penalty: Penalty { power, strength } } => write!(
+                f,
+                "penalty of power {power} and strength {strength}: expected a finite strength of 0 \
+                 or more and a power of 0 to 8 (of splines 1 or 2)"
+            ),
             Self::NotFinite { index, what } => write!(f, "sample {index}: {what} is not finite"),
             Self::Variance { index, what, value } => {
                 write!(f, "sample {index}: {what} {value:e}, expected more than 0")

@@ -5,7 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
-use crate::{BasisSpec, BeamRows, FitError, Ray, Region};
+use crate::{BasisSpec, BeamRows, FitError, Penalty, Ray, Region};
 use radiometry::DomainError;
 use std::f64::consts::FRAC_PI_2;
 
@@ -36,9 +36,12 @@ pub struct Parts {
     pub region: Region,
     /// Which functions.
     pub basis: BasisSpec,
+    /// What was held against them.
+    pub penalty: Penalty,
     /// One a function, in the value's unit.
     pub coefficients: Vec<f64>,
-    /// The upper triangular S of the independent covariance S Sᵀ, packed by columns: S₀₀, S₀₁, S₁₁,
+    /// The upper triangular S of the independent covariance S Sᵀ (with a penalty the posterior's, see
+    /// [`Penalty`]), packed by columns: S₀₀, S₀₁, S₁₁,
     /// S₀₂, ...
     pub factor: Vec<f64>,
     /// The coefficients' shift by one u of each common component.
@@ -63,8 +66,11 @@ pub struct Quality {
     pub condition: f64,
     /// Samples used.
     pub n_used: usize,
-    /// Samples less coefficients.
+    /// Samples less coefficients, or less what the samples determine of them where a penalty helps.
     pub dof: usize,
+    /// How many coefficients the samples determine: all of them without a penalty, fewer with one
+    /// (the trace of the matrix from values to fitted values).
+    pub determined: f64,
     /// Root mean square of value - fitted, unweighted, in the value's unit.
     pub residual_rms: f64,
     /// Sum of squared residuals over the samples' stated variance; about `dof` where noise and
@@ -92,13 +98,16 @@ impl Fit {
         if !parts.region.is_sound() {
             return Err(FitError::Region);
         }
-        let p = parts.basis.checked_len()?;
+        parts.basis.checked_len()?;
+        parts.penalty.check()?;
+        let basis = Basis::new(parts.basis, parts.region)?;
+        let p = basis.len();
         demand("coefficients", p, &parts.coefficients)?;
         demand("factor", p * (p + 1) / 2, &parts.factor)?;
         for common in &parts.shifts {
             demand("shift", p, &common.shift)?;
         }
-        Ok(Self { basis: Basis::new(parts.basis, parts.region), parts })
+        Ok(Self { basis, parts })
     }
 
     /// The numbers that the fit consists of.
@@ -124,9 +133,9 @@ impl Fit {
     }
 
     /// The exitance M = ∫ L cos θ dω over the whole hemisphere, mean over the region, in the
-    /// values' unit times sr: c₀ √π. Beyond what was measured it is extrapolated.
+    /// values' unit times sr: of Zernike polynomials c₀ √π. Beyond what was measured it is extrapolated.
     pub fn exitance(&self) -> Estimate {
-        self.estimate(&self.basis.exitance())
+        self.estimate(self.basis.exitance())
     }
 
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
@@ -138,8 +147,8 @@ impl Fit {
     /// The exitance within the region's own cone, mean over the region: what rests on measurement.
     pub fn exitance_within_region(&self) -> Estimate {
         let theta_max_rad = self.region().theta_max_rad.min(FRAC_PI_2);
-        let functional = self.basis.exitance_within(theta_max_rad);
-        self.estimate(&functional.unwrap_or_else(|_| self.basis.exitance()))
+        let within = self.basis.exitance_within(theta_max_rad);
+        self.estimate(within.as_deref().unwrap_or(self.basis.exitance()))
     }
 
     /// The flux that leaves the region: exitance times its area, in the values' unit times m² sr.
@@ -163,7 +172,7 @@ impl Fit {
 
     /// The exitance's uncertainty by source, the independent part first.
     pub fn contributions(&self) -> Vec<Contribution> {
-        self.budget(&self.basis.exitance())
+        self.budget(self.basis.exitance())
     }
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.
@@ -199,6 +208,16 @@ impl Fit {
     /// Which functions.
     pub fn basis(&self) -> BasisSpec {
         self.parts.basis
+    }
+
+    /// What was held against rough fields.
+    pub fn penalty(&self) -> Penalty {
+        self.parts.penalty
+    }
+
+    /// See [`Quality::determined`].
+    pub fn determined(&self) -> f64 {
+        self.parts.quality.determined
     }
 
     /// What the fit stands for.

@@ -63,7 +63,7 @@ impl Fit {
     /// let samples: Vec<Sample> =
     ///     (0..24).map(|i| Sample { ray: at(i), value: 100.0, noise }).collect();
     /// let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
-    /// let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+    /// let basis = BasisSpec::zernike(2, 0);
     /// let common = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
     /// let field = fit::fit(&samples, &region, basis, &[common])?;
     ///

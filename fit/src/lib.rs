@@ -30,7 +30,7 @@
 //! let samples: Vec<Sample> =
 //!     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
 //! let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
-//! let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+//! let basis = BasisSpec::zernike(2, 0);
 //! let responsivity = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
 //!
 //! let field = fit::fit(&samples, &region, basis, &[responsivity])?;
@@ -41,13 +41,14 @@
 //! # Ok::<(), fit::FitError>(())
 //! ```
 
-pub use basis::BasisSpec;
+pub use basis::{Angular, BasisSpec, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
 pub use error::FitError;
 pub use fitted::{CommonShift, Contribution, Estimate, Fit, Parts, Quality};
 pub use functional::Functional;
 pub use peak::Peak;
+pub use penalty::{Penalised, Penalty};
 pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
 pub use solve::{fit, fit_seen};
@@ -62,6 +63,7 @@ mod fitted;
 mod functional;
 mod grid;
 mod peak;
+mod penalty;
 pub mod regression;
 mod sample;
 mod shift;

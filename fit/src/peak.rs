@@ -35,12 +35,12 @@ impl Fit {
     /// The best places of the grid, a few of them so that a second lobe has its chance.
     fn starts(&self) -> Vec<Place> {
         let basis = self.functions();
-        let directions = directions(self.region().theta_max_rad, basis.spec().angular_degree);
+        let directions = directions(self.region().theta_max_rad, basis.directions().fineness());
         let mut z = vec![0.0; basis.angular_len()];
         let mut folded = vec![0.0; basis.angular_len()];
         let mut scratch = basis.scratch();
         let mut starts: Vec<(Place, f64)> = Vec::new();
-        for (a, b) in positions(basis.spec().position_degree) {
+        for (a, b) in positions(basis.places().fineness()) {
             let position = Place { a, b, ..Place::CENTRE };
             basis.position(&position.ray(self.region()), &mut scratch);
             folded.fill(0.0);
@@ -52,7 +52,7 @@ impl Fit {
             for &(u, v) in &directions {
                 let place = Place { u, v, a, b };
                 let ray = place.ray(self.region());
-                basis.direction(ray.theta_rad, ray.phi_rad, &mut z);
+                basis.direction(ray.theta_rad, ray.phi_rad, &mut scratch, &mut z);
                 keep(&mut starts, place, dot(&folded, &z));
             }
         }
@@ -68,7 +68,7 @@ impl Fit {
             basis.value(self.coefficients(), &place.ray(self.region()), &mut scratch)
         };
         let (mut place, mut value) = (start, at(start));
-        let mut step = STEP_FIRST / (basis.spec().angular_degree + 1) as f64;
+        let mut step = STEP_FIRST / (basis.directions().fineness() + 1) as f64;
         for _ in 0..STEPS_MAX {
             let around = place.neighbours(step, r_max);
             let best = around.map(|place| (place, at(place)));

@@ -1,5 +1,7 @@
 //! The fit itself: weights that settle, one factorisation, common components carried through it.
 //!
+//! A penalty is a few rows more: readings of zero of what is held against the field.
+//!
 //! Common components stay out of the weights. Being off by one u, a component changes the values
 //! by a vector; the same factorisation carries it to the coefficients as a further right-hand side.
 
@@ -8,9 +10,10 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
+use crate::penalty::{Penalised, Prior};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{BasisSpec, Common, FitError, Noise, Region, Sample, Shift, undetermined};
+use crate::{Common, FitError, Noise, Region, Sample, Shift, undetermined};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -20,10 +23,10 @@ use crate::{BasisSpec, Common, FitError, Noise, Region, Sample, Shift, undetermi
 pub fn fit(
     samples: &[Sample],
     region: &Region,
-    basis: BasisSpec,
+    model: impl Into<Penalised>,
     common: &[Common],
 ) -> Result<Fit, FitError> {
-    fit_seen(samples, region, basis, common, None)
+    fit_seen(samples, region, model, common, None)
 }
 
 /// As [`fit`], each sample being the mean of the field over a beam along its ray, zero off the
@@ -50,7 +53,7 @@ pub fn fit(
 /// let samples: Vec<Sample> =
 ///     read.iter().map(|(t, value)| Sample { ray: ray(*t), value: *value, noise }).collect();
 /// let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 1.4 };
-/// let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+/// let basis = BasisSpec::zernike(0, 0);
 /// let field = fit::fit_seen(&samples, &region, basis, &[], Some(&Optics { beam, outline }))?;
 /// assert!((field.value(&ray(80.0)) - 100.0).abs() < 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -58,30 +61,39 @@ pub fn fit(
 pub fn fit_seen(
     samples: &[Sample],
     region: &Region,
-    basis: BasisSpec,
+    model: impl Into<Penalised>,
     common: &[Common],
     optics: Option<&Optics>,
 ) -> Result<Fit, FitError> {
-    check(samples, region, basis, common)?;
-    let basis = Basis::new(basis, *region);
-    if let Some(refusal) = undetermined::by_count(samples, &basis) {
+    let model = model.into();
+    check(samples, region, model, common)?;
+    let basis = Basis::new(model.basis, *region)?;
+    let prior = Prior::new(&basis, model.penalty)?;
+    if prior.is_none()
+        && let Some(refusal) = undetermined::by_count(samples, &basis)
+    {
         return Err(refusal);
     }
     let design = Design::new(samples, &basis, optics)?;
-    let settled = settle(&design, samples.len() - basis.len())?;
+    let settled = settle(&design, &prior)?;
     let needs_a_side = |common: &Common| needs_a_side(common, &design);
     let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c)).collect();
     let sides = sensitivities(&design, &settled, &shifting)?;
-    let solution = solve(&design, &settled.variances, &sides)?;
+    let solution = solve(&design, &settled.variances, &sides, &prior)?;
     let coefficients = solution.unknowns(0);
     let shifts = shifts(common, &coefficients, &design, &solution);
     let levels = levels(&design, &coefficients);
-    let quality = quality(&design, &levels, &solution, &settled)?;
+    let factor = solution.inverse();
+    let determined = prior.determined(&factor, basis.len());
+    let quality = quality(&design, &levels, (&solution, determined), &settled)?;
+    let penalty = model.penalty;
+    let basis = basis.spec();
     Fit::from_parts(Parts {
         region: *region,
-        basis: basis.spec(),
+        basis,
+        penalty,
         coefficients,
-        factor: solution.inverse(),
+        factor,
         shifts,
         quality,
     })
@@ -94,12 +106,13 @@ pub(crate) fn levels(design: &Design<'_>, coefficients: &[f64]) -> Vec<f64> {
     (0..design.samples().len()).map(|i| design.level(i, coefficients, &mut room)).collect()
 }
 
-/// One pass of all rows, each divided by its standard uncertainty. `sides` are further right-hand
+/// One pass of all rows, each divided by its standard uncertainty, and of the penalty's. `sides` are further right-hand
 /// sides, one vector over the samples each.
 pub(crate) fn solve(
     design: &Design<'_>,
     variances: &[f64],
     sides: &[Vec<f64>],
+    prior: &Prior,
 ) -> Result<Solution, FitError> {
     let p = design.basis().len();
     let mut triangle = Triangle::new(p, 1 + sides.len());
@@ -120,6 +133,7 @@ pub(crate) fn solve(
         }
         triangle.absorb(&row);
     }
+    prior.absorb_into(&mut triangle, sides.len() + 1);
     triangle.solve().ok_or(FitError::OutOfRange)
 }
 
@@ -187,7 +201,7 @@ fn shifts(
 fn quality(
     design: &Design<'_>,
     levels: &[f64],
-    solution: &Solution,
+    (solution, determined): (&Solution, f64),
     settled: &Settled,
 ) -> Result<Quality, FitError> {
     let (samples, excess) = (design.samples(), settled.excess);
@@ -204,10 +218,17 @@ fn quality(
     Ok(Quality {
         condition: spectrum.condition(),
         n_used: samples.len(),
-        dof: samples.len() - solution.len(),
+        dof: left_over(samples.len(), determined),
+        determined,
         residual_rms: (squares / n).sqrt(),
         chi2,
         excess_rms: excess.sqrt(),
         beam: design.rows(&settled.variances),
     })
+}
+
+/// Samples less what they determine of the coefficients, to the nearest number.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between zero and a count
+fn left_over(samples: usize, determined: f64) -> usize {
+    libm::round(samples as f64 - determined).max(0.0) as usize
 }

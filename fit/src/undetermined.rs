@@ -166,8 +166,8 @@ fn causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
 
 fn angular_causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
     let terms = basis.angular_len();
-    let rank = rank(rays, terms, basis, |ray, _, row| {
-        basis.direction(ray.theta_rad, ray.phi_rad, row);
+    let rank = rank(rays, terms, basis, |ray, scratch, row| {
+        basis.direction(ray.theta_rad, ray.phi_rad, scratch, row);
     });
     if rank == terms {
         return Vec::new();
@@ -185,10 +185,11 @@ fn angular_causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
 
 /// A product of d factors x - xᵢ is a polynomial of degree d that vanishes at d positions.
 fn positions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
-    let degree = basis.spec().position_degree;
-    let axes = [("x", grid.x_m.len()), ("y", grid.y_m.len())].into_iter();
-    axes.filter(|(_, distinct)| *distinct <= degree)
-        .map(|(axis, distinct)| Cause::Positions { axis, distinct, degree })
+    // As many functions along a side as a polynomial of this degree has.
+    let (x, y) = basis.places().lines();
+    let axes = [("x", grid.x_m.len(), x - 1), ("y", grid.y_m.len(), y - 1)].into_iter();
+    axes.filter(|(_, distinct, degree)| distinct <= degree)
+        .map(|(axis, distinct, degree)| Cause::Positions { axis, distinct, degree })
         .collect()
 }
 
@@ -196,8 +197,9 @@ fn positions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
 /// product of circles, of degree 2 each, on as many angles from the normal. A line more takes in
 /// the pole.
 fn directions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
-    let degree = basis.spec().angular_degree;
     let mut causes = Vec::new();
+    let Some(needs) = basis.directions().needs() else { return causes };
+    let degree = needs.degree;
     match grid.azimuth_lines_rad.as_slice() {
         [phi_rad] if degree > 0 => causes.push(Cause::OneAzimuth { phi_rad: *phi_rad }),
         lines if (1..=degree).contains(&lines.len()) => {
@@ -206,7 +208,7 @@ fn directions(grid: &Grid, basis: &Basis) -> Vec<Cause> {
         _ => {}
     }
     let distinct = grid.theta_rad.len();
-    let needed = if grid.has_pole() { degree.div_ceil(2) + 1 } else { degree / 2 + 1 };
+    let needed = if grid.has_pole() { needs.theta_with_pole } else { needs.theta };
     if distinct < needed {
         causes.push(Cause::Polar { distinct, degree, needed });
     }

@@ -9,6 +9,7 @@
 //! residuals are as large as they should be (Paule & Mandel 1982, J. Res. NBS 87, 377).
 
 use crate::beam::design::Design;
+use crate::penalty::Prior;
 use crate::solve::{levels, solve};
 use crate::{FitError, Noise, Sample, undetermined};
 
@@ -25,13 +26,13 @@ pub(crate) struct Settled {
 }
 
 /// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes.
-pub(crate) fn settle(design: &Design<'_>, dof: usize) -> Result<Settled, FitError> {
+pub(crate) fn settle(design: &Design<'_>, prior: &Prior) -> Result<Settled, FitError> {
     let (samples, basis) = (design.samples(), design.basis());
     let model = Model::of(samples);
     let mut settled = start(samples, model);
     for pass in 0..PASSES_MAX {
-        let solution = solve(design, &settled.variances, &[])?;
-        if pass == 0 {
+        let solution = solve(design, &settled.variances, &[], prior)?;
+        if pass == 0 && prior.is_none() {
             let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
             if spectrum.rank() < basis.len() {
                 return Err(undetermined::by_rank(samples, basis));
@@ -39,6 +40,8 @@ pub(crate) fn settle(design: &Design<'_>, dof: usize) -> Result<Settled, FitErro
         }
         settled.coefficients = solution.unknowns(0);
         settled.levels = levels(design, &settled.coefficients);
+        let determined = prior.determined_by(&solution);
+        let dof = (samples.len() as f64 - determined).max(0.0);
         settled.excess = excess(samples, &settled.levels, model, dof);
         let next = model.variances(samples, &settled.levels, settled.excess);
         let change = next.iter().zip(&settled.variances).map(|(a, b)| (a / b - 1.0).abs());
@@ -103,9 +106,10 @@ impl Model {
     }
 }
 
-/// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof; 0 where the
+/// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof (samples less
+/// what they determine: what a penalty smooths away is in the posterior, not counted here twice); 0 where the
 /// stated noise explains the residuals.
-fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: usize) -> f64 {
+fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: f64) -> f64 {
     let terms: Vec<(f64, f64)> = samples
         .iter()
         .zip(levels)
@@ -114,10 +118,9 @@ fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: usize) -> f64 {
     let sum = |tau2: f64, power: i32| -> f64 {
         terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()
     };
-    let dof = dof as f64;
     let threshold =
         if has_unknown(samples) { dof } else { dof + EXCESS_SIGMA * (2.0 * dof).sqrt() };
-    if dof == 0.0 || sum(0.0, 1) <= threshold {
+    if dof <= 0.0 || sum(0.0, 1) <= threshold {
         return 0.0;
     }
     // Newton's method on 1/Σ, which is concave and rising: from 0 it rises to the root.

@@ -84,7 +84,7 @@ fn a_blurred_field_comes_back_and_the_axis_alone_is_biased() {
     let region = region(0.04, 75.0);
     // A wide beam: ±5°, 20 mm of spot.
     let beam = Beam::of_spot(0.02, 0.01, 0.3).unwrap();
-    let basis = BasisSpec { angular_degree: 6, position_degree: 1 };
+    let basis = BasisSpec::zernike(6, 1);
     let rays = spread_rays(260, &region, 11);
     let read = samples(&rays, |ray| read(&beam, ray, 1 << 13, &lobe));
     let optics = Optics { beam, outline: None };
@@ -111,7 +111,7 @@ fn a_field_whose_readings_run_over_the_outline_comes_back_within_its_u() {
         let is_on = (ray.x_m - 0.0005).hypot(ray.y_m + 0.0003) <= 0.009;
         if is_on { 20.0 + 30.0 * ray.theta_rad.cos().powi(4) } else { 0.0 }
     };
-    let basis = BasisSpec { angular_degree: 4, position_degree: 0 };
+    let basis = BasisSpec::zernike(4, 0);
     let rays = spread_rays(300, &region, 21);
     let mut die = Die::new(22);
     let mut read = samples(&rays, |ray| read(&stock(), ray, 1 << 13, &field));
@@ -132,7 +132,7 @@ fn a_field_whose_readings_run_over_the_outline_comes_back_within_its_u() {
 
 #[test]
 fn cut_rows_are_the_shares_of_rays_that_leave_the_sample() {
-    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let basis = BasisSpec::zernike(0, 0);
     let square = Outline::Rectangle { x_m: (-0.02, 0.02), y_m: (-0.015, 0.02) };
     let disk = Outline::Disk { centre_m: (0.003, 0.0), radius_m: 0.02 };
     let places =
@@ -157,7 +157,7 @@ fn cut_rows_are_the_shares_of_rays_that_leave_the_sample() {
 
 #[test]
 fn rays_from_below_the_horizon_see_nothing() {
-    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let basis = BasisSpec::zernike(0, 0);
     let optics = Optics { beam: stock(), outline: None };
     let region = region(0.02, 90.0);
     for (theta_deg, low, high) in
@@ -178,7 +178,7 @@ fn rays_from_below_the_horizon_see_nothing() {
 #[test]
 fn a_shrinking_beam_ends_in_the_point() {
     let region = region(0.02, 75.0);
-    let basis = BasisSpec { angular_degree: 6, position_degree: 1 };
+    let basis = BasisSpec::zernike(6, 1);
     let rays = spread_rays(200, &region, 31);
     let read = samples(&rays, lobe);
     let point = fit::fit(&read, &region, basis, &[]).unwrap();
@@ -209,7 +209,7 @@ fn the_quadrature_holds_what_it_says() {
             + 100.0 * ray.x_m * v
             + 2e3 * ray.x_m * ray.y_m
     };
-    let basis = BasisSpec { angular_degree: 6, position_degree: 2 };
+    let basis = BasisSpec::zernike(6, 2);
     let rays = spread_rays(400, &region, 41);
     // Two fine rules of another make, so that their own error is known to be small.
     let rule = stock().rule(9);
@@ -242,7 +242,7 @@ fn the_quadrature_holds_what_it_says() {
 #[test]
 fn a_constant_is_a_constant_inside_whatever_the_rule() {
     let region = region(0.02, 80.0);
-    let basis = BasisSpec { angular_degree: 5, position_degree: 2 };
+    let basis = BasisSpec::zernike(5, 2);
     let read = samples(&spread_rays(300, &region, 51), |_| 7.0);
     let optics = Optics { beam: stock(), outline: None };
     let fit = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
@@ -260,7 +260,7 @@ fn an_offset_of_cut_readings_is_no_constant_field() {
     let rays = spread_rays(60, &region, 61);
     let on = |ray: &Ray| f64::from(ray.x_m.hypot(ray.y_m) <= 0.006);
     let read = samples(&rays, |ray| read(&stock(), ray, 1 << 13, &on));
-    let basis = BasisSpec { angular_degree: 1, position_degree: 0 };
+    let basis = BasisSpec::zernike(1, 0);
     let offset = |u: f64| {
         let shifted: Vec<Sample> =
             read.iter().map(|s| Sample { value: s.value + u, ..*s }).collect();
@@ -277,7 +277,7 @@ fn an_offset_of_cut_readings_is_no_constant_field() {
 #[test]
 fn an_outline_without_area_is_refused() {
     let region = region(0.004, 80.0);
-    let basis = BasisSpec { angular_degree: 0, position_degree: 0 };
+    let basis = BasisSpec::zernike(0, 0);
     let read = samples(&spread_rays(4, &region, 71), |_| 1.0);
     let nan = Outline::Disk { centre_m: (0.0, f64::NAN), radius_m: 1.0 };
     let flat = Outline::Rectangle { x_m: (0.0, 1.0), y_m: (1.0, 1.0) };

@@ -9,7 +9,7 @@ use scenes::disturbed::disturbed;
 use scenes::{Die, REGION, exact, scaled, spread_rays};
 use std::f64::consts::{PI, TAU};
 
-const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 1 };
+const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
 
 fn level(ray: &Ray) -> f64 {
     let (x, _) = scaled(ray);
@@ -100,7 +100,7 @@ fn no_ray_is_nothing_and_another_fits_functional_is_refused() {
     let nothing = field.of(&field.weighted_rays([]));
     let zeros = [nothing.value, nothing.u, nothing.u_independent].map(f64::to_bits);
     assert_eq!(zeros, [0.0_f64.to_bits(); 3]);
-    let coarser = BasisSpec { angular_degree: 2, position_degree: 0 };
+    let coarser = BasisSpec::zernike(2, 0);
     let samples = exact(&spread_rays(50, &REGION, 7), |_| 1.0);
     let other = fit::fit(&samples, &REGION, coarser, &[]).unwrap();
     let functional = other.weighted_rays(cone(0.1));

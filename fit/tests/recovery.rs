@@ -8,7 +8,7 @@ use fit::{BasisSpec, Common, Noise, Parts, Ray, Sample, Shift};
 use scenes::{Die, REGION, exact, raster_rays, scaled, spread_rays};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 2 };
+const BASIS: BasisSpec = BasisSpec::zernike(4, 2);
 
 /// A polynomial in sin θ cos φ, sin θ sin φ, x and y of the degrees of `BASIS`. Its mean over the
 /// region is 3 + u² + u⁴ - v/2 + (0.4 + 0.2/3)(1 - u² - v²), since <x²> = 1/3 and <x> = <xy> = 0.
@@ -76,7 +76,7 @@ fn a_lambertian_source_has_pi_times_its_radiance_as_exitance() {
 fn the_exitance_of_a_cosine_power_is_two_pi_over_n_plus_two() {
     // Even powers are polynomials on the disk; odd ones converge with the degree.
     for (power, degree, tolerance) in [(2, 2, 1e-13), (4, 4, 1e-13), (8, 8, 1e-12), (3, 12, 1e-4)] {
-        let basis = BasisSpec { angular_degree: degree, position_degree: 0 };
+        let basis = BasisSpec::zernike(degree, 0);
         let samples =
             exact(&raster_rays(&REGION, 21, 36, 1), |ray| libm::cos(ray.theta_rad).powi(power));
         let field = fit::fit(&samples, &REGION, basis, &[]).unwrap();
@@ -117,7 +117,7 @@ fn duplicated_samples_halve_the_variance_and_nothing_else() {
 
 #[test]
 fn well_spread_samples_have_a_condition_of_one_digit() {
-    let basis = BasisSpec { angular_degree: 8, position_degree: 2 };
+    let basis = BasisSpec::zernike(8, 2);
     let samples = exact(&spread_rays(2000, &REGION, 7), polynomial);
     let condition = fit::fit(&samples, &REGION, basis, &[]).unwrap().condition();
     assert!(condition < 10.0, "condition {condition}");
@@ -125,7 +125,7 @@ fn well_spread_samples_have_a_condition_of_one_digit() {
 
 #[test]
 fn a_raster_conditions_degree_eight_as_well() {
-    let basis = BasisSpec { angular_degree: 8, position_degree: 2 };
+    let basis = BasisSpec::zernike(8, 2);
     let samples = exact(&raster_rays(&REGION, 17, 24, 3), polynomial);
     let condition = fit::fit(&samples, &REGION, basis, &[]).unwrap().condition();
     assert!(condition < 30.0, "condition {condition}");
@@ -181,7 +181,7 @@ fn stored_parts_give_the_same_answers() {
 #[test]
 fn the_covariance_matrix_says_what_the_estimates_say() {
     let samples = exact(&spread_rays(300, &REGION, 13), polynomial);
-    let basis = BasisSpec { angular_degree: 2, position_degree: 1 };
+    let basis = BasisSpec::zernike(2, 1);
     let common = || {
         vec![
             Common { name: "scale".into(), u: 0.01, shift: Shift::Scale },
@@ -204,7 +204,7 @@ fn the_covariance_matrix_says_what_the_estimates_say() {
 #[test]
 fn functions_are_named_by_their_degrees() {
     let samples = exact(&spread_rays(300, &REGION, 14), polynomial);
-    let basis = BasisSpec { angular_degree: 1, position_degree: 2 };
+    let basis = BasisSpec::zernike(1, 2);
     let names = fit::fit(&samples, &REGION, basis, &[]).unwrap().names();
     assert_eq!(names[..4], ["Z(0,0)", "Z(1,-1)", "Z(1,1)", "Z(0,0) P1(x)"]);
     assert_eq!(names[13], "Z(1,-1) P1(x) P1(y)");

@@ -6,7 +6,7 @@ mod scenes;
 use fit::{BasisSpec, Common, FitError, Noise, Ray, Region, Sample, Shift};
 use scenes::{Die, REGION, exact, raster_rays, spread_rays};
 
-const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 2 };
+const BASIS: BasisSpec = BasisSpec::zernike(4, 2);
 
 fn refusal(samples: &[Sample], region: &Region, basis: BasisSpec) -> String {
     fit::fit(samples, region, basis, &[]).unwrap_err().to_string()
@@ -73,7 +73,7 @@ fn too_few_readings_are_counted() {
         sample.noise = Noise::Unknown;
     }
     says(&refusal(&samples, &REGION, BASIS), "90 readings of unknown noise");
-    let vast = BasisSpec { angular_degree: 1000, position_degree: usize::MAX };
+    let vast = BasisSpec::zernike(1000, usize::MAX);
     says(&refusal(&samples, &REGION, vast), "are more than 4096");
 }
 
@@ -97,7 +97,7 @@ fn too_few_azimuths_and_polar_angles_are_counted() {
 fn scatter_about_too_few_azimuths_is_no_information() {
     // Eight meridians at 0.01° of readback scatter: degree 8 has a solution, of noise alone.
     let mut die = Die::new(6);
-    let basis = BasisSpec { angular_degree: 8, position_degree: 0 };
+    let basis = BasisSpec::zernike(8, 0);
     let mut rays = raster_rays(&REGION, 12, 16, 2);
     for ray in &mut rays {
         ray.theta_rad = (ray.theta_rad + 2e-4 * die.uniform()).min(1.5);
@@ -116,7 +116,7 @@ fn a_term_that_vanishes_on_all_azimuths_measured_is_named() {
     for (k, ray) in rays.iter_mut().enumerate() {
         ray.phi_rad = [0.0, 0.5, 1.0, -0.5][k % 4] * std::f64::consts::PI;
     }
-    let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+    let basis = BasisSpec::zernike(2, 0);
     let text = refusal(&exact(&rays, |_| 1.0), &REGION, basis);
     says(&text, "5 of 6 coefficients are determined; only 2 distinct azimuth lines");
     says(&text, "most involved: Z(2,-2)");
@@ -160,11 +160,7 @@ fn position_and_direction_must_vary_independently() {
             ray.theta_rad = 1.0 + 20.0 * ray.x_m;
             ray.phi_rad = 300.0 * ray.y_m;
         }
-        refusal(
-            &exact(&rays, |_| 1.0),
-            &REGION,
-            BasisSpec { angular_degree: 1, position_degree: 2 },
-        )
+        refusal(&exact(&rays, |_| 1.0), &REGION, BasisSpec::zernike(1, 2))
     };
     says(&text, "position and direction were not varied independently");
 }
@@ -177,7 +173,7 @@ fn a_point_region_is_fitted_without_position_terms() {
         (ray.x_m, ray.y_m) = (0.010_02, 0.0);
     }
     let samples = exact(&rays, |_| 2.0);
-    let basis = BasisSpec { angular_degree: 4, position_degree: 0 };
+    let basis = BasisSpec::zernike(4, 0);
     let field = fit::fit(&samples, &region, basis, &[]).unwrap();
     assert!((field.exitance().value - 2.0 * std::f64::consts::PI).abs() < 1e-12);
     says(&refusal(&samples, &region, BASIS), "only 1 distinct position in x");

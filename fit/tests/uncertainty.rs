@@ -8,7 +8,7 @@ use fit::{BasisSpec, Common, Fit, Noise, Ray, Sample, Shift};
 use scenes::{Die, REGION, exact, raster_rays, scaled, spread_rays};
 use std::f64::consts::PI;
 
-const BASIS: BasisSpec = BasisSpec { angular_degree: 4, position_degree: 1 };
+const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
 const SEEDS: u64 = 200;
 
 /// A polynomial lobe on a floor, from 30 at the normal to about 4 at the rim.

@@ -92,10 +92,10 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
     let region = region_of(&input);
-    let basis = BasisSpec {
-        angular_degree: args.angular_degree.unwrap_or(ANGULAR_DEGREE),
-        position_degree: args.position_degree.unwrap_or(POSITION_DEGREE),
-    };
+    let basis = BasisSpec::zernike(
+        args.angular_degree.unwrap_or(ANGULAR_DEGREE),
+        args.position_degree.unwrap_or(POSITION_DEGREE),
+    );
     let samples = input.fit_samples(args.u_relative);
     let optics = args.rig.as_deref().map(optics_of).transpose()?;
     let fit = fit::fit_seen(&samples, &region, basis, &[], optics.as_ref())

@@ -22,8 +22,7 @@ pub(crate) struct Outlook {
 pub(crate) fn outlook(setup: &Setup) -> Option<Result<Outlook, FitError>> {
     let spec = basis(setup.plan.fit);
     let targets = &setup.sequence.targets;
-    let (n, m) = (spec.angular_degree as f64 + 1.0, spec.position_degree as f64 + 1.0);
-    let coefficients = n * (n + 1.0) / 2.0 * m * (m + 1.0) / 2.0;
+    let coefficients = spec.len() as f64;
     if targets.len() as f64 * coefficients * coefficients > WORK_MAX {
         return None;
     }

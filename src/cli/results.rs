@@ -186,7 +186,7 @@ pub(crate) fn optics(setup: &Setup) -> Option<Optics> {
 
 /// The plan's basis as the fit takes it.
 pub(crate) fn basis(spec: FitSpec) -> BasisSpec {
-    BasisSpec { angular_degree: spec.angular_degree, position_degree: spec.position_degree }
+    BasisSpec::zernike(spec.angular_degree, spec.position_degree)
 }
 
 /// What is true, and how far the fit lies from it.

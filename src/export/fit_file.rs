@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use fit::{BeamRows, Estimate, Fit};
+use fit::{Angular, BeamRows, Estimate, Fit, Position};
 use serde_json::{Map, Value, json};
 
 use crate::rig::Quantity;
@@ -77,15 +77,8 @@ impl FitFile<'_> {
         let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
         put("quantity", json!(quantity.name()));
         put("simulated", json!(self.simulated));
-        put(
-            "basis",
-            json!({
-                "kind": "Zernike on the Nusselt disk times Legendre in x and y",
-                "angular_degree": fit.basis().angular_degree,
-                "position_degree": fit.basis().position_degree,
-                "functions": fit.names(),
-            }),
-        );
+        put("basis", basis(fit));
+        put("penalty", json!({"power": fit.penalty().power, "strength": fit.penalty().strength}));
         put(
             "region",
             json!({
@@ -101,6 +94,7 @@ impl FitFile<'_> {
         put("excess_rms", json!(fit.excess_rms()));
         put("chi2", json!(fit.chi2()));
         put("dof", json!(fit.dof()));
+        put("determined", json!(fit.determined()));
         put("beam", fit.beam().map_or(Value::Null, beam));
         put("n_used", json!(fit.n_used()));
         put("n_flagged", json!(self.n_flagged));
@@ -159,6 +153,38 @@ impl FitFile<'_> {
     }
 }
 
+/// Which functions. What a kind does not have is null.
+fn basis(fit: &Fit) -> Value {
+    let spec = fit.basis();
+    let (cosine_columns, spans) = match spec.angular {
+        Angular::Zernike { cosine_columns, .. } => (Some(cosine_columns), None),
+        Angular::Hemispherical { .. } | Angular::EvenHarmonics { .. } => (None, None),
+        Angular::Splines { theta_spans, phi_spans } => (None, Some((theta_spans, phi_spans))),
+    };
+    let position_spans = match spec.position {
+        Position::Legendre { .. } => None,
+        Position::Splines { spans } => Some(spans),
+    };
+    let angular = match spec.angular {
+        Angular::Zernike { .. } => "Zernike on the Nusselt disk",
+        Angular::Hemispherical { .. } => "hemispherical harmonics",
+        Angular::EvenHarmonics { .. } => "even spherical harmonics",
+        Angular::Splines { .. } => "cubic B-splines in theta and phi",
+    };
+    let position = if position_spans.is_some() { "cubic B-splines" } else { "Legendre" };
+    json!({
+        "kind": format!("{angular} times {position} in x and y"),
+        "angular": spec.angular.name(),
+        "angular_degree": spec.angular.degree(),
+        "cosine_columns": cosine_columns,
+        "theta_spans": spans.map(|(theta, _)| theta),
+        "phi_spans": spans.map(|(_, phi)| phi),
+        "position_degree": spec.position.degree(),
+        "position_spans": position_spans,
+        "functions": fit.names(),
+    })
+}
+
 /// How many readings count as what, and by how much of its own independent u the averages'
 /// quadrature may shift a derived quantity.
 fn beam(rows: BeamRows) -> Value {
@@ -210,7 +236,7 @@ mod tests {
         let samples: Vec<Sample> =
             (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
         let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
-        let basis = BasisSpec { angular_degree: 2, position_degree: 0 };
+        let basis = BasisSpec::zernike(2, 0);
         let scale = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
         fit::fit(&samples, &region, basis, &[scale]).unwrap()
     }

@@ -1,5 +1,8 @@
 //! How far a rule over a beam can be off, for any field of a basis.
 //!
+//! Holds for fields that are as large below the horizon as above it, as Zernike polynomials and even
+//! harmonics are, times polynomials in the place. For other bases rules are compared instead.
+//!
 //! Along a great circle a field of degree n is a trigonometric polynomial of that degree: off the
 //! real axis, at α + iβ, it is at most e^(n|β|) times its largest value (Bernstein; Boas 1954,
 //! Entire Functions, 11.4). A polynomial of total degree d in the place, within δ of the square
@@ -26,22 +29,23 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    pub(crate) fn new(beam: &Beam, basis: &Basis) -> Self {
-        let spec = basis.spec();
+    /// `None` of a basis that it doesn't hold for.
+    pub(crate) fn new(beam: &Beam, basis: &Basis) -> Option<Self> {
+        let degree = basis.directions().mirrored_degree()?;
+        let position_degree = basis.spec().position.degree()?;
         let half = |(from, to): (f64, f64)| (to - from) / 2.0;
         let Region { x_m, y_m, .. } = *basis.region();
         let widths = [half(x_m), half(y_m)].into_iter().filter(|half| *half > 0.0);
         let narrowest = widths.fold(f64::INFINITY, f64::min);
         let is_even = !narrowest.is_finite();
-        let position =
-            if is_even { 0 } else { i32::try_from(spec.position_degree).unwrap_or(i32::MAX) };
-        Self {
-            angular: spec.angular_degree as f64,
+        let position = if is_even { 0 } else { i32::try_from(position_degree).unwrap_or(i32::MAX) };
+        Some(Self {
+            angular: degree as f64,
             position,
             slope: (beam.stop_radius_m() + beam.pupil_radius_m()) / beam.separation_m(),
             reach: if is_even { 0.0 } else { beam.reach_m(0.0) / narrowest },
             moments: beam.moments().ok(),
-        }
+        })
     }
 
     /// The largest error of the axis's ray for the beam, as a part of the field's largest value.

@@ -4,12 +4,13 @@
 //! Errors eᵢ of fitted readings of standard uncertainty uᵢ shift no derived quantity by more than
 //! √Σ(eᵢ/uᵢ)² of its own independent u, however they conspire. So a row may err by a tenth of
 //! uᵢ/√n. For beams that nothing cuts a bound says what a rule may err by for any field of the basis
-//! as large as the largest sample ([`super::bound`]). For beams that the outline or the horizon cuts
-//! two rules are compared, each function of the basis at that size: an estimate. The finest rule is
+//! as large as the largest sample ([`super::bound`]). For beams that the outline or the horizon cuts,
+//! and for bases without such a bound, two rules are compared, each function of the basis at that size: an estimate. The finest rule is
 //! taken where none is fine enough; [`BeamRows::quadrature`] says what that may amount to.
 
 use radiometry::quadrature::Sum;
 
+use super::bound::Bound;
 use super::{Averager, Cover, Means, Optics};
 use crate::basis::{Basis, Scratch, dot};
 use crate::weights::Model;
@@ -41,6 +42,20 @@ enum Kind {
     Smooth(usize),
     Across(usize),
     Off,
+}
+
+impl Kind {
+    /// What is tried for a beam that nothing cuts, and for one that something does.
+    const SMOOTH: &'static [Self] = &[
+        Self::Point,
+        Self::Smooth(0),
+        Self::Smooth(1),
+        Self::Smooth(2),
+        Self::Smooth(3),
+        Self::Smooth(4),
+        Self::Smooth(5),
+    ];
+    const ACROSS: &'static [Self] = &[Self::Across(0), Self::Across(1), Self::Across(2)];
 }
 
 /// The rows of samples in a basis.
@@ -176,14 +191,14 @@ impl Averager {
     }
 
     /// The coarsest rule for a beam that nothing cuts, and what it may err by.
-    fn rule_within(&self, theta_rad: f64, allowed: f64) -> (Kind, f64) {
-        let point = self.bound.of_point(theta_rad);
+    fn rule_within(&self, bound: &Bound, theta_rad: f64, allowed: f64) -> (Kind, f64) {
+        let point = bound.of_point(theta_rad);
         if point <= allowed {
             return (Kind::Point, point);
         }
         let mut last = (Kind::Point, point);
         for (i, rule) in self.smooth.iter().enumerate() {
-            last = (Kind::Smooth(i), self.bound.of_rule(theta_rad, rule.degree));
+            last = (Kind::Smooth(i), bound.of_rule(theta_rad, rule.degree));
             if last.1 <= allowed {
                 break;
             }
@@ -299,25 +314,40 @@ impl<'b> Choice<'b> {
     fn of(&mut self, averager: &Averager, ray: &Ray, allowed: f64) -> (Kind, f64) {
         match averager.cover(ray) {
             Cover::Off => (Kind::Off, 0.0),
-            Cover::Within => averager.rule_within(ray.theta_rad, allowed),
-            Cover::Across => self.compared(averager, ray, allowed),
+            Cover::Within => match &averager.bound {
+                Some(bound) => averager.rule_within(bound, ray.theta_rad, allowed),
+                None => self.compared(averager, ray, allowed, Kind::SMOOTH),
+            },
+            Cover::Across => self.compared(averager, ray, allowed, Kind::ACROSS),
         }
     }
 
     /// A finer rule differs from a coarser one by about what the coarser one errs.
-    fn compared(&mut self, averager: &Averager, ray: &Ray, allowed: f64) -> (Kind, f64) {
+    fn compared(
+        &mut self,
+        averager: &Averager,
+        ray: &Ray,
+        allowed: f64,
+        kinds: &[Kind],
+    ) -> (Kind, f64) {
         let Self { basis, means, row, coarser, largest } = self;
-        let mut last = (Kind::Across(0), f64::INFINITY);
+        let mut last = (kinds[0], f64::INFINITY);
         averager.row(last.0, ray, basis, means, row);
-        for rule in 1..averager.across.len() {
+        for kind in &kinds[1..] {
             std::mem::swap(row, coarser);
-            last.0 = Kind::Across(rule);
+            last.0 = *kind;
             averager.row(last.0, ray, basis, means, row);
             let pairs = row.iter().zip(coarser.iter()).zip(largest.iter());
             let off = pairs.map(|((a, b), largest)| (a - b).abs() / largest).fold(0.0, f64::max);
+            let (floor, gain) = match kind {
+                // The point stands for the beam if the coarsest rule says so too.
+                Kind::Smooth(0) if off <= allowed => return (Kind::Point, off),
+                Kind::Smooth(_) => (0.0, GAIN),
+                _ => (FLOOR, GAIN),
+            };
             // The rules' errors fall at least as fast as from one of them to the next.
-            last.1 = off * GAIN;
-            if last.1 <= allowed.max(FLOOR) {
+            last.1 = off * gain;
+            if last.1 <= allowed.max(floor) {
                 break;
             }
         }

@@ -2,8 +2,8 @@
 //! (1/T) ∫ L dT over all rays through pupil and spot, zero off the sample. A row of the design is
 //! the basis averaged so. It does not know which reading deserves which rule: that is [`design`].
 //!
-//! Beyond the region the position polynomials go on, out to twice its half width, and are constant
-//! from there: nothing was measured there, and they must not run away with a footprint that near
+//! Beyond the region the position polynomials go on, out to twice its half width (splines end with
+//! it), and are constant from there: nothing was measured there, and they must not run away with a footprint that near
 //! grazing is longer than any sample. Below the horizon nothing is seen: rays from there are zero.
 
 mod bound;
@@ -14,6 +14,7 @@ mod lens;
 mod outline;
 mod sight;
 
+use glam::DVec3;
 use radiometry::beam::{Beam, footprint};
 
 use crate::basis::{Basis, Scratch};
@@ -69,7 +70,8 @@ enum Cover {
 #[derive(Debug, Clone)]
 pub(crate) struct Averager {
     optics: Optics,
-    bound: Bound,
+    /// `None` of a basis for which rules are compared instead.
+    bound: Option<Bound>,
     /// By rising degree.
     smooth: Vec<Directions>,
     /// The same, for beams that something cuts.
@@ -87,11 +89,12 @@ impl Averager {
         let region = basis.region();
         let is_wide = |(from, to): (f64, f64)| to > from;
         let is_even = !is_wide(region.x_m) && !is_wide(region.y_m);
-        let degree = if is_even { 0 } else { basis.spec().position_degree };
+        let degree = if is_even { 0 } else { basis.places().rule_degree() };
         let beam = &optics.beam;
         let smooth = SMOOTH_DEGREES.iter().map(|d| Directions::smooth(beam, *d, degree));
         let across = ACROSS_DEGREES.iter().map(|d| Directions::kinked(beam, *d, degree));
         let axes = [(true, region.x_m), (false, region.y_m)];
+        let limit = basis.places().continued();
         let ends = axes.into_iter().filter(|(_, axis)| degree > 0 && is_wide(*axis));
         Ok(Self {
             optics: *optics,
@@ -99,7 +102,7 @@ impl Averager {
             smooth: smooth.collect(),
             across: across.collect(),
             cutter: Cutter::new(degree),
-            ends: ends.map(|(is_x, axis)| (is_x, continued(axis))).collect(),
+            ends: ends.map(|(is_x, axis)| (is_x, continued(axis, limit))).collect(),
         })
     }
 
@@ -138,7 +141,7 @@ impl Averager {
             let shear = sight.shear(&self.optics.beam, node);
             scratch.clear();
             self.whole(rule, node, (&sight, &shear), basis, scratch);
-            basis.direction_along(direction, &mut scratch.direction);
+            scratch.direction_along(direction, basis);
             scratch.add(node.weight, out);
         }
     }
@@ -197,7 +200,7 @@ impl Averager {
                     });
                 }
             }
-            basis.direction_along(direction, &mut scratch.direction);
+            scratch.direction_along(direction, basis);
             scratch.add(node.weight, out);
         }
     }
@@ -220,12 +223,16 @@ impl Means {
         }
     }
 
+    fn direction_along(&mut self, direction: DVec3, basis: &Basis) {
+        basis.direction_along(direction, &mut self.place, &mut self.direction);
+    }
+
     fn clear(&mut self) {
         self.position.fill(0.0);
     }
 
     fn add_place(&mut self, weight: f64, basis: &Basis, (x_m, y_m): (f64, f64)) {
-        basis.position_continued(x_m, y_m, CONTINUED, &mut self.place);
+        basis.position_continued(x_m, y_m, &mut self.place);
         for (mean, term) in self.position.iter_mut().zip(self.place.position()) {
             *mean += weight * term;
         }
@@ -239,14 +246,12 @@ impl Means {
     }
 }
 
-/// Twice an interval about its middle.
-fn continued((from, to): (f64, f64)) -> (f64, f64) {
+/// An interval stretched about its middle.
+fn continued((from, to): (f64, f64), limit: f64) -> (f64, f64) {
     let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
-    (middle - CONTINUED * half, middle + CONTINUED * half)
+    (middle - limit * half, middle + limit * half)
 }
 
-/// The position polynomials end here, in half widths of the region from its middle.
-const CONTINUED: f64 = 2.0;
 /// Degrees in the slopes of rules for beams that nothing cuts.
 const SMOOTH_DEGREES: [usize; 6] = [3, 5, 7, 9, 13, 21];
 /// Degrees of rules for beams that something cuts: what is averaged has kinks.

@@ -1,0 +1,204 @@
+//! The functions that a fit is made of: functions of the direction times functions of the position
+//! over the region.
+//!
+//! Function k = q · angular + j is the j-th function of the direction times the q-th of the position.
+//! Legendre terms other than the first have mean zero over the region, and Zernike polynomials other
+//! than the first have no exitance: there derived quantities are short sums. It knows no samples.
+
+mod angular;
+mod place;
+mod spec;
+mod splines;
+
+use crate::{FitError, Ray, Region};
+use glam::DVec3;
+use radiometry::{DomainError, direction};
+use std::f64::consts::FRAC_PI_2;
+
+pub(crate) use angular::Directions;
+pub(crate) use place::Places;
+pub use spec::{Angular, BasisSpec, Position};
+pub(crate) use splines::{Derivative, PolarSplines};
+
+/// The functions of a spec over a region, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub(crate) struct Basis {
+    directions: Directions,
+    places: Places,
+    region: Region,
+    spec: BasisSpec,
+    /// Of every function, over the hemisphere.
+    exitance: Vec<f64>,
+}
+
+/// Scratch of one evaluation.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    direction: Vec<f64>,
+    room: Vec<f64>,
+    lines: [Vec<f64>; 2],
+    position: Vec<f64>,
+}
+
+impl Scratch {
+    /// The position terms evaluated last.
+    pub(crate) fn position(&self) -> &[f64] {
+        &self.position
+    }
+}
+
+impl Basis {
+    pub(crate) fn new(spec: BasisSpec, region: Region) -> Result<Self, FitError> {
+        let directions = Directions::new(spec.angular)?;
+        let places = Places::new(spec.position, &region)?;
+        let mut new = Self { directions, places, region, spec, exitance: Vec::new() };
+        let refused = |_: DomainError| FitError::Basis { kind: spec.angular.name() };
+        new.exitance = new.exitance_within(FRAC_PI_2).map_err(refused)?;
+        Ok(new)
+    }
+
+    pub(crate) fn spec(&self) -> BasisSpec {
+        self.spec
+    }
+
+    pub(crate) fn region(&self) -> &Region {
+        &self.region
+    }
+
+    pub(crate) fn directions(&self) -> &Directions {
+        &self.directions
+    }
+
+    pub(crate) fn places(&self) -> &Places {
+        &self.places
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.angular_len() * self.places.len()
+    }
+
+    pub(crate) fn angular_len(&self) -> usize {
+        self.directions.len()
+    }
+
+    pub(crate) fn position_len(&self) -> usize {
+        self.places.len()
+    }
+
+    pub(crate) fn scratch(&self) -> Scratch {
+        let (x, y) = self.places.lines();
+        Scratch {
+            direction: vec![0.0; self.angular_len()],
+            room: self.directions.room(),
+            lines: [vec![0.0; x], vec![0.0; y]],
+            position: vec![0.0; self.places.len()],
+        }
+    }
+
+    /// The functions of the direction along an angle.
+    pub(crate) fn direction(&self, theta: f64, phi: f64, scratch: &mut Scratch, out: &mut [f64]) {
+        self.direction_along(direction::unit(theta, phi), scratch, out);
+    }
+
+    /// As [`direction`](Self::direction), at a unit vector.
+    pub(crate) fn direction_along(&self, d: DVec3, scratch: &mut Scratch, out: &mut [f64]) {
+        self.directions.evaluate(d, &mut scratch.room, out);
+    }
+
+    /// The position terms at the ray's foot.
+    pub(crate) fn position(&self, ray: &Ray, scratch: &mut Scratch) {
+        self.position_at(self.region.scaled(ray), scratch);
+    }
+
+    fn position_at(&self, place: (f64, f64), scratch: &mut Scratch) {
+        self.places.evaluate(place, &mut scratch.lines, &mut scratch.position);
+    }
+
+    /// The position terms at a place; beyond [`Places::continued`] they are constant.
+    pub(crate) fn position_continued(&self, x_m: f64, y_m: f64, scratch: &mut Scratch) {
+        if self.places.rule_degree() == 0 {
+            // Of the one term there is.
+            scratch.position.fill(1.0);
+            return;
+        }
+        let limit = self.places.continued();
+        let (x, y) = Places::scaled(&self.region, x_m, y_m);
+        self.position_at((x.clamp(-limit, limit), y.clamp(-limit, limit)), scratch);
+    }
+
+    /// The largest value of a function within region and hemisphere.
+    pub(crate) fn largest(&self, k: usize) -> f64 {
+        self.directions.largest(k % self.angular_len())
+    }
+
+    /// All functions along a ray.
+    pub(crate) fn row(&self, ray: &Ray, scratch: &mut Scratch, out: &mut [f64]) {
+        self.evaluate(ray, scratch);
+        for (q, p) in scratch.position.iter().enumerate() {
+            let block = &mut out[q * scratch.direction.len()..][..scratch.direction.len()];
+            for (out, z) in block.iter_mut().zip(&scratch.direction) {
+                *out = p * z;
+            }
+        }
+    }
+
+    /// The value of the field with these coefficients along a ray.
+    pub(crate) fn value(&self, coefficients: &[f64], ray: &Ray, scratch: &mut Scratch) -> f64 {
+        self.evaluate(ray, scratch);
+        let blocks = coefficients.chunks_exact(scratch.direction.len());
+        scratch.position.iter().zip(blocks).map(|(p, c)| p * dot(c, &scratch.direction)).sum()
+    }
+
+    fn evaluate(&self, ray: &Ray, scratch: &mut Scratch) {
+        let Scratch { direction, room, .. } = scratch;
+        self.directions.evaluate_angles(ray.theta_rad, ray.phi_rad, room, direction);
+        self.position(ray, scratch);
+    }
+
+    /// The exitance within a cone about the normal, mean over the region, as a linear functional:
+    /// the sum of its elements times the coefficients.
+    pub(crate) fn exitance_within(&self, theta_max_rad: f64) -> Result<Vec<f64>, DomainError> {
+        let mut over_cone = vec![0.0; self.angular_len()];
+        self.directions.integrals_within(theta_max_rad, &mut over_cone)?;
+        Ok(self.over_region(&over_cone))
+    }
+
+    /// The exitance of the whole hemisphere, mean over the region.
+    pub(crate) fn exitance(&self) -> &[f64] {
+        &self.exitance
+    }
+
+    /// What the coefficients are when the field is 1 everywhere.
+    pub(crate) fn unity(&self) -> Vec<f64> {
+        let mut everywhere = vec![0.0; self.angular_len()];
+        self.directions.unity(&mut everywhere);
+        let unity = |q: usize| self.places.unity(q);
+        self.product(unity, &everywhere)
+    }
+
+    /// The mean over the region of the value in a direction, as a linear functional.
+    pub(crate) fn mean_over_region(&self, theta_rad: f64, phi_rad: f64) -> Vec<f64> {
+        let mut values = vec![0.0; self.angular_len()];
+        self.direction(theta_rad, phi_rad, &mut self.scratch(), &mut values);
+        self.over_region(&values)
+    }
+
+    fn over_region(&self, directions: &[f64]) -> Vec<f64> {
+        self.product(|q| self.places.mean(q), directions)
+    }
+
+    fn product(&self, places: impl Fn(usize) -> f64, directions: &[f64]) -> Vec<f64> {
+        let blocks = (0..self.places.len()).map(places);
+        blocks.flat_map(|p| directions.iter().map(move |d| p * d)).collect()
+    }
+
+    /// The function's name: of the direction's, and what varies with the position.
+    pub(crate) fn name(&self, k: usize) -> String {
+        let (q, j) = (k / self.angular_len(), k % self.angular_len());
+        format!("{}{}", self.directions.name(j), self.places.name(q))
+    }
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,165 @@
+//! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
+
+use super::splines::{Band, bands};
+use crate::FitError;
+
+/// Which functions a field is a sum of: every function of direction times every one of position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BasisSpec {
+    /// The functions of the direction.
+    pub angular: Angular,
+    /// The functions of the place on the sample.
+    pub position: Position,
+}
+
+/// Functions of the direction, over the hemisphere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Angular {
+    /// Zernike polynomials on the Nusselt disk up to degree n, (n + 1)(n + 2)/2 of them: smooth
+    /// fields, and most others. They extrapolate better than all others between 80° and 90°.
+    Zernike {
+        /// The degree n.
+        degree: usize,
+        /// Further functions cos θ Z(2k,0), k from 0: a field that depends on cos θ itself, as limb
+        /// darkening does, is no polynomial on the disk, which follows it but slowly.
+        cosine_columns: usize,
+    },
+    /// Hemispherical harmonics up to degree l, (l + 1)² of them: lobes at grazing angles. Those
+    /// that vary with φ vanish at the horizon, and readings are needed up to there.
+    Hemispherical {
+        /// The degree l.
+        degree: usize,
+    },
+    /// The spherical harmonics that are even about the sample's plane (l + m even) up to degree l,
+    /// (l + 1)(l + 2)/2 of them. They span what Zernike polynomials of that degree do, and
+    /// are the better conditioned where directions are dense at grazing.
+    EvenHarmonics {
+        /// The degree l.
+        degree: usize,
+    },
+    /// Cubic B-splines in θ times such in φ, of which there are the fewer the nearer the pole;
+    /// smooth over it. For lobes that no polynomial follows.
+    Splines {
+        /// Equal spans of θ from the normal to the horizon.
+        theta_spans: usize,
+        /// Equal spans of φ round the horizon; round the cone θ about sin θ times as many.
+        phi_spans: usize,
+    },
+}
+
+/// Functions of the place on the sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Position {
+    /// Products of Legendre polynomials in x and y up to the total degree d, (d + 1)(d + 2)/2 of
+    /// them. Degree 0: alike everywhere.
+    Legendre {
+        /// The total degree d.
+        degree: usize,
+    },
+    /// Products of cubic B-splines in x and y, (spans + 3)² of them, for what changes within the
+    /// sample more often than a polynomial bends. Along a side without length: the constant alone.
+    Splines {
+        /// Equal spans along each side of the region.
+        spans: usize,
+    },
+}
+
+impl BasisSpec {
+    /// Zernike polynomials of a degree times Legendre polynomials of a total degree.
+    pub const fn zernike(angular_degree: usize, position_degree: usize) -> Self {
+        Self {
+            angular: Angular::Zernike { degree: angular_degree, cosine_columns: 0 },
+            position: Position::Legendre { degree: position_degree },
+        }
+    }
+
+    /// Number of coefficients, if a dense fit may hold them.
+    pub(crate) fn checked_len(&self) -> Result<usize, FitError> {
+        let coefficients = self.len();
+        if coefficients <= COEFFICIENTS_MAX {
+            Ok(coefficients)
+        } else {
+            Err(FitError::TooLarge { coefficients, coefficients_max: COEFFICIENTS_MAX })
+        }
+    }
+
+    /// Number of coefficients at most: splines over a region without length in x or in y have fewer.
+    pub fn len(&self) -> usize {
+        self.angular.len().saturating_mul(self.position.len())
+    }
+
+    /// Never: the constant is always there.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+}
+
+impl Angular {
+    /// Number of functions.
+    #[expect(clippy::len_without_is_empty, reason = "there is always one")]
+    pub fn len(&self) -> usize {
+        match *self {
+            Self::Zernike { degree, cosine_columns } => {
+                triangular(degree).saturating_add(cosine_columns)
+            }
+            Self::Hemispherical { degree } => degree.saturating_add(1).saturating_pow(2),
+            Self::EvenHarmonics { degree } => triangular(degree),
+            // More spans than this have too many functions whatever they are.
+            Self::Splines { theta_spans, phi_spans }
+                if theta_spans.max(phi_spans) > COEFFICIENTS_MAX =>
+            {
+                usize::MAX
+            }
+            Self::Splines { theta_spans, phi_spans } => {
+                bands(theta_spans, phi_spans).map(Band::len).sum()
+            }
+        }
+    }
+
+    /// The degree of polynomials; `None` of splines.
+    pub fn degree(&self) -> Option<usize> {
+        match *self {
+            Self::Zernike { degree, .. }
+            | Self::Hemispherical { degree }
+            | Self::EvenHarmonics { degree } => Some(degree),
+            Self::Splines { .. } => None,
+        }
+    }
+
+    /// The kind's name, as plans write it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Zernike { .. } => "zernike",
+            Self::Hemispherical { .. } => "hemispherical",
+            Self::EvenHarmonics { .. } => "even-harmonics",
+            Self::Splines { .. } => "splines",
+        }
+    }
+}
+
+impl Position {
+    /// Number of functions over a region with length in x and in y.
+    #[expect(clippy::len_without_is_empty, reason = "there is always one")]
+    pub fn len(&self) -> usize {
+        match *self {
+            Self::Legendre { degree } => triangular(degree),
+            Self::Splines { spans } => spans.saturating_add(3).saturating_pow(2),
+        }
+    }
+
+    /// The total degree of polynomials; `None` of splines.
+    pub fn degree(&self) -> Option<usize> {
+        match *self {
+            Self::Legendre { degree } => Some(degree),
+            Self::Splines { .. } => None,
+        }
+    }
+}
+
+/// 1 + 2 + .. + (degree + 1).
+fn triangular(degree: usize) -> usize {
+    degree.saturating_add(1).saturating_mul(degree.saturating_add(2)) / 2
+}
+
+/// Beyond it the triangle alone takes 134 MB, and the factorisation minutes.
+const COEFFICIENTS_MAX: usize = 4096;

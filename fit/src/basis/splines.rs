@@ -1,0 +1,276 @@
+//! Cubic B-splines over the hemisphere: in θ between normal and horizon, round φ in every band of θ
+//! as many as its circle is long, so that they are about as wide everywhere.
+//!
+//! At the pole a field that is smooth in space is 1, θ cos φ, θ sin φ, θ² cos 2φ, ... and nothing
+//! else. So the band that begins at the pole and the one after hold sines and cosines instead of
+//! splines round φ: of order 0 the two of them together, which have no slope at the pole; of order
+//! 1 the second; the third holds orders up to 2. From the fourth on, where the splines begin with
+//! θ³, there are splines in φ ("polar splines", after Toshniwal, Speleers, Hiemstra and Hughes
+//! 2017). The sum of those of order 0 and of all others is 1.
+
+use glam::DVec3;
+use radiometry::DomainError;
+use radiometry::basis::BSpline;
+use radiometry::quadrature::gauss_legendre;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// The functions round φ of one band.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Band {
+    /// 1, cos φ, sin φ, cos 2φ, ... from order `first` to `last`.
+    Orders { first: usize, last: usize },
+    /// So many periodic B-splines.
+    Local { count: usize },
+}
+
+impl Band {
+    pub(crate) fn len(self) -> usize {
+        match self {
+            Self::Orders { first: 0, last } => 2 * last + 1,
+            Self::Orders { first, last } => 2 * (last + 1 - first),
+            Self::Local { count } => count,
+        }
+    }
+}
+
+/// The bands of θ, from the pole; the first one's function of θ is the sum of the first two splines,
+/// the second's the second.
+pub(crate) fn bands(theta_spans: usize, phi_spans: usize) -> impl Iterator<Item = Band> {
+    let theta_spans = theta_spans.max(1);
+    (0..theta_spans + DEGREE).map(move |i| match i {
+        0 => Band::Orders { first: 0, last: 0 },
+        1 => Band::Orders { first: 1, last: 1 },
+        2 => Band::Orders { first: 0, last: 2 },
+        _ => {
+            // Greville's abscissa: where the spline is centred.
+            let place = greville(i, theta_spans);
+            let round = libm::round(phi_spans as f64 * libm::sin(place));
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small, positive
+            Band::Local { count: (round as usize).max(PHI_SPANS_MIN) }
+        }
+    })
+}
+
+/// Where spline `i` of `spans` equal spans of [0, π/2] is centred.
+fn greville(i: usize, spans: usize) -> f64 {
+    let knot = |k: usize| k.saturating_sub(DEGREE).min(spans) as f64 / spans as f64;
+    FRAC_PI_2 * (1..=DEGREE).map(|k| knot(i + k)).sum::<f64>() / DEGREE as f64
+}
+
+/// All functions, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub(crate) struct PolarSplines {
+    theta: BSpline,
+    bands: Vec<Placed>,
+    len: usize,
+    phi_spans: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Placed {
+    band: Band,
+    /// Of its first function.
+    at: usize,
+    /// Of [`Band::Local`].
+    round: Option<BSpline>,
+}
+
+/// A value or a derivative: of this order in θ, and in φ.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Derivative {
+    pub(crate) theta: usize,
+    pub(crate) phi: usize,
+}
+
+impl PolarSplines {
+    pub(crate) fn new(theta_spans: usize, phi_spans: usize) -> Result<Self, DomainError> {
+        let spans = theta_spans.max(1);
+        let breaks: Vec<f64> = (0..=spans).map(|i| FRAC_PI_2 * i as f64 / spans as f64).collect();
+        let mut placed = Vec::with_capacity(spans + DEGREE);
+        let mut at = 0;
+        for band in bands(theta_spans, phi_spans) {
+            let round = match band {
+                Band::Orders { .. } => None,
+                Band::Local { count } => Some(round(count)?),
+            };
+            placed.push(Placed { band, at, round });
+            at += band.len();
+        }
+        Ok(Self { theta: BSpline::open(DEGREE, &breaks)?, bands: placed, len: at, phi_spans })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// The most places of a grid over a quarter turn that tell the functions apart.
+    pub(crate) fn fineness(&self) -> usize {
+        self.theta.len().max(self.phi_spans.div_ceil(2))
+    }
+
+    /// All values in a direction; below the horizon those at it.
+    pub(crate) fn evaluate_direction(&self, d: DVec3, out: &mut [f64]) {
+        out.fill(0.0);
+        let theta = libm::atan2(libm::hypot(d.x, d.y), d.z);
+        let phi = libm::atan2(d.y, d.x);
+        let value = Derivative { theta: 0, phi: 0 };
+        // Within the domain by the clamp.
+        let done = self.each(theta, phi, value, |k, value| out[k] += value);
+        debug_assert!(done.is_ok(), "a direction has a θ and a φ");
+    }
+
+    /// Hands on every function whose derivative may not be zero, in θ and φ.
+    pub(crate) fn each(
+        &self,
+        theta_rad: f64,
+        phi_rad: f64,
+        order: Derivative,
+        mut hand: impl FnMut(usize, f64),
+    ) -> Result<(), DomainError> {
+        let theta_rad = theta_rad.clamp(0.0, FRAC_PI_2);
+        let across = self.theta.nonzero_derivatives(theta_rad, order.theta)?;
+        for (i, along) in across.iter() {
+            // The first band's function of θ is the first spline and the second.
+            if i == 1 && order.phi == 0 {
+                hand(self.bands[0].at, along);
+            }
+            let placed = &self.bands[i];
+            match (&placed.round, placed.band) {
+                (Some(round), _) => {
+                    let around = round.nonzero_derivatives(phi_rad, order.phi)?;
+                    around.iter().for_each(|(j, value)| hand(placed.at + j, along * value));
+                }
+                (None, Band::Orders { first, last }) => {
+                    let mut at = placed.at;
+                    for m in first..=last {
+                        let [cos, sin] = wave(m, phi_rad, order.phi);
+                        hand(at, along * cos);
+                        at += 1;
+                        if m > 0 {
+                            hand(at, along * sin);
+                            at += 1;
+                        }
+                    }
+                }
+                (None, Band::Local { .. }) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// What the coefficients of the constant 1 are.
+    pub(crate) fn unity(&self, out: &mut [f64]) {
+        out.fill(0.0);
+        for placed in &self.bands {
+            match placed.band {
+                Band::Orders { first: 0, .. } => out[placed.at] = 1.0,
+                Band::Orders { .. } => {}
+                Band::Local { count } => out[placed.at..][..count].fill(1.0),
+            }
+        }
+    }
+
+    /// ∫ cos θ dω of every function over the cone.
+    pub(crate) fn integrals_within(
+        &self,
+        theta_max_rad: f64,
+        out: &mut [f64],
+    ) -> Result<(), DomainError> {
+        out.fill(0.0);
+        let rule = gauss_legendre(GAUSS);
+        let mut over_theta = vec![0.0; self.theta.len()];
+        for (low, high) in self.theta.spans() {
+            let high = high.min(theta_max_rad);
+            if low >= high {
+                break;
+            }
+            let (middle, half) = (f64::midpoint(low, high), (high - low) / 2.0);
+            for (node, weight) in &rule {
+                let theta = middle + half * node;
+                let (sin, cos) = libm::sincos(theta);
+                for (i, value) in self.theta.nonzero(theta)?.iter() {
+                    over_theta[i] += weight * half * sin * cos * value;
+                }
+            }
+        }
+        out[self.bands[0].at] = TAU * over_theta[1];
+        for (placed, over_theta) in self.bands.iter().zip(&over_theta) {
+            match placed.band {
+                Band::Orders { first: 0, .. } => out[placed.at] += TAU * over_theta,
+                Band::Orders { .. } => {}
+                Band::Local { count } => {
+                    out[placed.at..][..count].fill(TAU / count as f64 * over_theta);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Nodes that integrate products of two functions' derivatives over the hemisphere, with
+    /// weights sin θ dθ dφ: exact but for the sine where the splines round φ have their knots at
+    /// the nodes' spans, and close to it elsewhere.
+    pub(crate) fn nodes(&self) -> Vec<(f64, f64, f64)> {
+        let rule = gauss_legendre(DEGREE + 1);
+        let round = 3 * self.phi_spans.max(2 * PHI_SPANS_MIN);
+        let mut nodes = Vec::new();
+        for (low, high) in self.theta.spans() {
+            let (middle, half) = (f64::midpoint(low, high), (high - low) / 2.0);
+            for (node, weight) in &rule {
+                let theta = middle + half * node;
+                let weight = weight * half * libm::sin(theta) * TAU / round as f64;
+                nodes.extend(
+                    (0..round).map(|k| (theta, TAU * (k as f64 + 0.5) / round as f64, weight)),
+                );
+            }
+        }
+        nodes
+    }
+
+    /// Where a function is centred.
+    pub(crate) fn name(&self, k: usize) -> String {
+        let at = self.bands.partition_point(|placed| placed.at <= k) - 1;
+        let placed = &self.bands[at];
+        let theta_deg = greville(at, self.theta.len() - DEGREE).to_degrees();
+        match placed.band {
+            Band::Local { count } => {
+                // A cubic spline is centred two spans after its support begins; the first one's
+                // begins three spans before φ = 0.
+                let turns = ((k - placed.at) as f64 - 1.0) / count as f64;
+                let phi_deg = 360.0 * (turns - libm::floor(turns));
+                format!("B({theta_deg:.1}°,{phi_deg:.1}°)")
+            }
+            Band::Orders { first, .. } => {
+                let place = k - placed.at + usize::from(first != 0);
+                let m = place.div_ceil(2);
+                match (m, place % 2) {
+                    (0, _) => format!("B({theta_deg:.1}°)"),
+                    (m, 1) => format!("B({theta_deg:.1}°) cos {m}φ"),
+                    (m, _) => format!("B({theta_deg:.1}°) sin {m}φ"),
+                }
+            }
+        }
+    }
+}
+
+/// cos mφ and sin mφ, or their derivatives.
+fn wave(m: usize, phi_rad: f64, order: usize) -> [f64; 2] {
+    let m = m as f64;
+    let (sin, cos) = libm::sincos(m * phi_rad);
+    match order {
+        0 => [cos, sin],
+        1 => [-m * sin, m * cos],
+        _ => [-m * m * cos, -m * m * sin],
+    }
+}
+
+fn round(count: usize) -> Result<BSpline, DomainError> {
+    let breaks: Vec<f64> = (0..=count).map(|k| TAU * k as f64 / count as f64).collect();
+    BSpline::periodic(DEGREE, &breaks)
+}
+
+/// Cubic: the field and its first two derivatives are continuous.
+const DEGREE: usize = 3;
+/// Fewer splines round a circle than these tell no lobe's direction; those next to the pole.
+const PHI_SPANS_MIN: usize = 6;
+/// Nodes of a span's integral: a cubic times sin θ cos θ is exact to rounding.
+const GAUSS: usize = 10;

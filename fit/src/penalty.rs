@@ -1,0 +1,336 @@
+//! What is held against a field before anything is measured: roughness, the more the rougher.
+//!
+//! A penalty λ cᵀP c added to the squares is at the same time a prior: coefficients that scatter about
+//! zero with covariance (λP)⁻¹. The coefficients' covariance after the fit is then
+//! `(AᵀWA + λP)⁻¹` (Wahba 1983, "Bayesian confidence intervals for the cross-validated smoothing
+//! spline"; Silverman 1985): it holds the noise, and what the smoothing takes away, and in gaps it
+//! grows to what the prior allows. The constant field is never penalised.
+//!
+//! P is a product of one matrix for the direction and one for the position. Polynomials of degree n
+//! count ((1 + n)^power)²; splines their mean square and that of their derivatives of order `power`.
+
+use crate::basis::{Basis, Derivative, Directions, PolarSplines, dot};
+use crate::triangle::{Solution, Triangle};
+use crate::{BasisSpec, FitError};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Mat, MatRef, Par, Side};
+
+/// How roughness is held against a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Penalty {
+    /// A function of degree n may be as large as 1/(1 + n)^power of one of degree 0. For
+    /// splines the order of the derivative, 1 or 2.
+    pub power: f64,
+    /// λ: the inverse of the variance of a coefficient of weight 1, in the value's unit to the -2.
+    /// 0: nothing is held against anything.
+    pub strength: f64,
+}
+
+impl Penalty {
+    /// Plain least squares.
+    pub const NONE: Self = Self { power: 0.0, strength: 0.0 };
+
+    /// Whether it holds anything against a field.
+    pub fn is_none(&self) -> bool {
+        self.strength == 0.0
+    }
+
+    pub(crate) fn check(&self) -> Result<(), FitError> {
+        let is_sound = self.strength.is_finite()
+            && self.strength >= 0.0
+            && (0.0..=POWER_MAX).contains(&self.power);
+        if is_sound { Ok(()) } else { Err(FitError::Penalty { penalty: *self }) }
+    }
+}
+
+/// A basis with what is held against its fields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Penalised {
+    /// Which functions.
+    pub basis: BasisSpec,
+    /// What is held against them.
+    pub penalty: Penalty,
+}
+
+impl From<BasisSpec> for Penalised {
+    fn from(basis: BasisSpec) -> Self {
+        Self { basis, penalty: Penalty::NONE }
+    }
+}
+
+/// A penalty at its strength over a basis; nothing where it has none.
+#[derive(Debug, Clone)]
+pub(crate) struct Prior {
+    roughness: Option<Roughness>,
+    /// √λ.
+    factor: f64,
+}
+
+impl Prior {
+    pub(crate) fn new(basis: &Basis, penalty: Penalty) -> Result<Self, FitError> {
+        let is_some = !penalty.is_none() && basis.len() > 1;
+        let roughness = is_some.then(|| Roughness::new(basis, penalty.power)).transpose()?;
+        Ok(Self { roughness, factor: penalty.strength.sqrt() })
+    }
+
+    pub(crate) fn is_none(&self) -> bool {
+        self.roughness.is_none()
+    }
+
+    /// Takes the penalty's rows in, with zeros for the right-hand sides.
+    pub(crate) fn absorb_into(&self, triangle: &mut Triangle, sides: usize) {
+        if let Some(roughness) = &self.roughness {
+            let mut wide = Vec::new();
+            roughness.rows(self.factor, |row| {
+                wide.clear();
+                wide.extend_from_slice(row);
+                wide.resize(row.len() + sides, 0.0);
+                triangle.absorb(&wide);
+            });
+        }
+    }
+
+    /// How many coefficients the samples determine rather than the penalty: all of them less
+    /// λ tr(P C), from the packed S of the covariance C = S Sᵀ.
+    pub(crate) fn determined(&self, factor: &[f64], coefficients: usize) -> f64 {
+        let Some(roughness) = &self.roughness else { return coefficients as f64 };
+        let mut held = 0.0;
+        roughness.rows(self.factor, |row| {
+            let first = row.iter().position(|value| *value != 0.0).unwrap_or(0);
+            held += (first..coefficients)
+                .map(|j| dot(&factor[j * (j + 1) / 2 + first..][..=j - first], &row[first..=j]))
+                .map(|product| product * product)
+                .sum::<f64>();
+        });
+        (coefficients as f64 - held).max(0.0)
+    }
+
+    /// The same of a solution.
+    pub(crate) fn determined_by(&self, solution: &Solution) -> f64 {
+        if self.is_none() {
+            return solution.len() as f64;
+        }
+        self.determined(&solution.inverse(), solution.len())
+    }
+}
+
+/// The square root L of `P = LᵀL`, upper triangular and of full rank, and the direction w = L u/|L u|
+/// of the constant field u, which is free: what is held against c is |(1 - w wᵀ) L c|².
+#[derive(Debug, Clone)]
+pub(crate) struct Roughness {
+    root: Root,
+    free: Vec<f64>,
+}
+
+#[derive(Debug, Clone)]
+enum Root {
+    Diagonal(Vec<f64>),
+    Upper(Mat<f64>),
+}
+
+impl Roughness {
+    /// Of a basis, at strength 1.
+    pub(crate) fn new(basis: &Basis, power: f64) -> Result<Self, FitError> {
+        let directions = direction_root(basis.directions(), power)?;
+        let places = place_root(basis, power)?;
+        let root = if let (Root::Diagonal(a), Root::Diagonal(b)) = (&directions, &places) {
+            Root::Diagonal(b.iter().flat_map(|b| a.iter().map(move |a| a * b)).collect())
+        } else {
+            let n = directions.len();
+            let entry = |i: usize, j: usize| places.at(i / n, j / n) * directions.at(i % n, j % n);
+            Root::Upper(Mat::from_fn(basis.len(), basis.len(), entry))
+        };
+        let mut free = root.times(&basis.unity());
+        let length = dot(&free, &free).sqrt();
+        for value in &mut free {
+            *value /= length;
+        }
+        Ok(Self { root, free })
+    }
+
+    /// The rows that stand for the penalty, to be taken in like readings of value 0; each is handed
+    /// over times `factor`.
+    pub(crate) fn rows(&self, factor: f64, mut take: impl FnMut(&[f64])) {
+        let p = self.free.len();
+        let mut row = vec![0.0; p];
+        if let Root::Diagonal(diagonal) = &self.root {
+            for (k, weight) in diagonal.iter().enumerate() {
+                // The constant is one of the functions.
+                if self.free[k] == 0.0 {
+                    row[k] = factor * weight;
+                    take(&row);
+                    row[k] = 0.0;
+                }
+            }
+            return;
+        }
+        // wᵀL, then (1 - w wᵀ) L row by row.
+        let across: Vec<f64> =
+            (0..p).map(|j| (0..=j).map(|i| self.free[i] * self.root.at(i, j)).sum()).collect();
+        for i in 0..p {
+            for (j, out) in row.iter_mut().enumerate() {
+                *out = factor * (self.root.at(i, j) - self.free[i] * across[j]);
+            }
+            take(&row);
+        }
+    }
+
+    /// R in coordinates in which the penalty is that of the identity on all but the first, which is
+    /// free: R L⁻¹ H, H being the reflection that takes w to the first axis.
+    #[allow(dead_code, reason = "for choosing the strength from the data, which comes next")]
+    pub(crate) fn standard(&self, r: MatRef<'_, f64>) -> Mat<f64> {
+        let p = self.free.len();
+        let mut out = match &self.root {
+            Root::Diagonal(d) => Mat::from_fn(r.nrows(), p, |i, j| r[(i, j)] / d[j]),
+            Root::Upper(root) => {
+                // X L = R, so Lᵀ Xᵀ = Rᵀ.
+                let mut turned = r.transpose().to_owned();
+                let lower = root.transpose();
+                solve_lower_triangular_in_place(lower, turned.as_mut(), Par::Seq);
+                turned.transpose().to_owned()
+            }
+        };
+        // H = 1 - 2 v vᵀ/|v|², v = w - e.
+        let mut v = self.free.clone();
+        let sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
+        v[0] -= sign;
+        let square = dot(&v, &v);
+        let mut products = vec![0.0; out.nrows()];
+        for (j, v) in v.iter().enumerate() {
+            let column = out.col_as_slice(j);
+            products.iter_mut().zip(column).for_each(|(product, x)| *product += x * v);
+        }
+        for (j, v) in v.iter().enumerate() {
+            let factor = 2.0 * v / square;
+            let column = out.col_as_slice_mut(j);
+            column.iter_mut().zip(&products).for_each(|(x, product)| *x -= factor * product);
+        }
+        out
+    }
+}
+
+impl Root {
+    fn len(&self) -> usize {
+        match self {
+            Self::Diagonal(diagonal) => diagonal.len(),
+            Self::Upper(upper) => upper.nrows(),
+        }
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        match self {
+            Self::Diagonal(diagonal) if i == j => diagonal[i],
+            Self::Upper(upper) if i <= j => upper[(i, j)],
+            Self::Diagonal(_) | Self::Upper(_) => 0.0,
+        }
+    }
+
+    fn times(&self, x: &[f64]) -> Vec<f64> {
+        let p = self.len();
+        (0..p).map(|i| (i..p).map(|j| self.at(i, j) * x[j]).sum()).collect()
+    }
+
+    /// Of a symmetric positive matrix, row by row.
+    fn of(matrix: &Mat<f64>) -> Result<Self, FitError> {
+        let cholesky = matrix.llt(Side::Lower).map_err(|_| FitError::OutOfRange)?;
+        Ok(Self::Upper(cholesky.L().transpose().to_owned()))
+    }
+}
+
+fn direction_root(directions: &Directions, power: f64) -> Result<Root, FitError> {
+    if let Directions::Splines(splines) = directions {
+        return spline_root(splines, power);
+    }
+    let weight = |j: usize| libm::pow(1.0 + directions.degree(j) as f64, power);
+    Ok(Root::Diagonal((0..directions.len()).map(weight).collect()))
+}
+
+fn place_root(basis: &Basis, power: f64) -> Result<Root, FitError> {
+    let places = basis.places();
+    if places.is_polynomial() {
+        let weight = |q: usize| libm::pow(1.0 + places.degree(q) as f64, power);
+        return Ok(Root::Diagonal((0..places.len()).map(weight).collect()));
+    }
+    let grams = places.grams()?;
+    let n = places.len();
+    Root::of(&Mat::from_fn(n, n, |p, q| grams.of(p, q).1))
+}
+
+/// ∫ (f² + roughness) dω/2π: of order 1 the squared gradient on the sphere, of order 2 the squared
+/// second derivatives `f_θθ`, `(f_θφ - cot θ f_φ)/sin θ` (twice) and `f_φφ/sin² θ + cot θ f_θ`, which
+/// are finite at the pole for what is smooth there.
+fn spline_root(splines: &PolarSplines, power: f64) -> Result<Root, FitError> {
+    let is_order = |order: f64| (power - order).abs() < 1e-9;
+    if !is_order(1.0) && !is_order(2.0) {
+        return Err(FitError::Penalty { penalty: Penalty { power, strength: 1.0 } });
+    }
+    let n = splines.len();
+    let mut matrix = Mat::<f64>::zeros(n, n);
+    let mut form = Form { dense: vec![0.0; n], touched: Vec::new() };
+    for (theta, phi, weight) in splines.nodes() {
+        let (sin, cos) = libm::sincos(theta);
+        let (over, cot) = (1.0 / sin, cos / sin);
+        let forms: &[&[(usize, usize, f64)]] = if is_order(1.0) {
+            &[&[(0, 0, 1.0)], &[(1, 0, 1.0)], &[(0, 1, over)]]
+        } else {
+            let sqrt2 = core::f64::consts::SQRT_2;
+            &[
+                &[(0, 0, 1.0)],
+                &[(2, 0, 1.0)],
+                &[(1, 1, sqrt2 * over), (0, 1, -sqrt2 * over * cot)],
+                &[(0, 2, over * over), (1, 0, cot)],
+            ]
+        };
+        for terms in forms {
+            form.fill(splines, (theta, phi), terms)?;
+            form.add_square(weight / core::f64::consts::TAU, &mut matrix);
+        }
+    }
+    Root::of(&matrix)
+}
+
+/// A linear form over the functions, of which few are not zero.
+struct Form {
+    dense: Vec<f64>,
+    touched: Vec<usize>,
+}
+
+impl Form {
+    /// The sum of derivatives, each times a factor: (order in θ, order in φ, factor).
+    fn fill(
+        &mut self,
+        splines: &PolarSplines,
+        (theta, phi): (f64, f64),
+        terms: &[(usize, usize, f64)],
+    ) -> Result<(), FitError> {
+        let Self { dense, touched } = self;
+        for k in touched.drain(..) {
+            dense[k] = 0.0;
+        }
+        for &(along, around, factor) in terms {
+            let order = Derivative { theta: along, phi: around };
+            let taken = splines.each(theta, phi, order, |k, value| {
+                if dense[k] == 0.0 {
+                    touched.push(k);
+                }
+                dense[k] += factor * value;
+            });
+            taken.map_err(|_| FitError::OutOfRange)?;
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        Ok(())
+    }
+
+    fn add_square(&self, weight: f64, matrix: &mut Mat<f64>) {
+        for &j in &self.touched {
+            let factor = weight * self.dense[j];
+            for &i in &self.touched {
+                matrix[(i, j)] += factor * self.dense[i];
+            }
+        }
+    }
+}
+
+/// Beyond it nothing but the constant would be left.
+const POWER_MAX: f64 = 8.0;
