@@ -16,7 +16,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const LEVEL: f64 = 100.0;
 
 fn fitted(field: impl Fn(&Ray) -> f64, variance: f64, common: &[Common]) -> Fit {
-    let basis = BasisSpec { angular_degree: 4, position_degree: 1 };
+    let basis = BasisSpec::zernike(4, 1);
     let mut samples = exact(&spread_rays(400, &REGION, 7), field);
     for sample in &mut samples {
         sample.noise = Noise::Fixed { variance };

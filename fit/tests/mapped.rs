@@ -23,7 +23,7 @@ fn fitted(
     position_degree: usize,
     field: impl Fn(&Ray) -> f64,
 ) -> Fit {
-    let basis = BasisSpec { angular_degree, position_degree };
+    let basis = BasisSpec::zernike(angular_degree, position_degree);
     let mut samples = exact(&spread_rays(900, region, 7), field);
     for sample in &mut samples {
         sample.noise = Noise::Fixed { variance: 1e-2 };

@@ -11,7 +11,7 @@ use scenes::{REGION, exact, spread_rays};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 fn fitted(field: impl Fn(&Ray) -> f64, variance: f64) -> Fit {
-    let basis = BasisSpec { angular_degree: 6, position_degree: 0 };
+    let basis = BasisSpec::zernike(6, 0);
     let mut samples = exact(&spread_rays(400, &REGION, 7), field);
     for sample in &mut samples {
         sample.noise = Noise::Fixed { variance };

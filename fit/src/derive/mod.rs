@@ -24,7 +24,7 @@
 //! let samples: Vec<Sample> =
 //!     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
 //! let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
-//! let fit = fit::fit(&samples, &region, BasisSpec { angular_degree: 2, position_degree: 0 }, &[])?;
+//! let fit = fit::fit(&samples, &region, BasisSpec::zernike(2, 0), &[])?;
 //!
 //! let field = Field::of(&fit);
 //! let exitance = field.exitance_at(0.002, -0.003, fit::derive::HEMISPHERE)?;
