@@ -17,6 +17,7 @@ pub mod kernel;
 mod machine;
 pub mod picture;
 mod program;
+pub mod scatter;
 mod statistics;
 mod stopwatch;
 mod table;

@@ -1,4 +1,4 @@
-//! Rigs and scenes with one effect each, of random size.
+//! Rigs with one effect each, of random size, before scenes of one patch.
 
 use sim::{
     AxisFlaws, Drift, Emitter, EncoderError, Flicker, GainSwitching, MainsFlicker, MissedSteps,
@@ -6,22 +6,23 @@ use sim::{
     Tabulated, Terms, Uncertain, WarmUp, compile,
 };
 
+use super::dice::Dice;
 use crate::bench::exact_rig;
 
 /// A rig and a scene with one effect to weigh.
-pub(crate) struct Case {
-    pub(crate) effect: &'static str,
-    pub(crate) scene: Scene,
-    pub(crate) nominal: Nominal,
-    pub(crate) simulated: Simulated,
-    pub(crate) terms: Terms,
-    pub(crate) measure: Measure,
+pub(super) struct Case {
+    pub(super) effect: &'static str,
+    pub(super) scene: Scene,
+    pub(super) nominal: Nominal,
+    pub(super) simulated: Simulated,
+    pub(super) terms: Terms,
+    pub(super) measure: Measure,
     /// An outline across the region at this x, and how far the effect reaches, metres.
-    pub(crate) outline_m: Option<(f64, f64)>,
+    pub(super) outline_m: Option<(f64, f64)>,
 }
 
 /// How the true influence is had.
-pub(crate) enum Measure {
+pub(super) enum Measure {
     /// The largest over poses, of a dwell that begins at this device time, seconds.
     Poses(f64),
     /// The largest over moments that a dwell may begin at, in one pose.
@@ -38,9 +39,9 @@ pub(crate) enum Measure {
     Sides,
 }
 
-pub(crate) type Draw = fn(&mut Dice) -> Case;
+pub(super) type Draw = fn(&mut Dice) -> Case;
 
-pub(crate) const EFFECTS: [Draw; 25] = [
+pub(super) const EFFECTS: [Draw; 27] = [
     stray_light,
     dark_current,
     dark_drift,
@@ -53,8 +54,10 @@ pub(crate) const EFFECTS: [Draw; 25] = [
     shot_noise,
     read_noise,
     flicker_noise,
+    data_sheet,
     theta_zero,
     theta_homing,
+    theta_scale,
     phi_zero,
     backlash,
     encoder_error,
@@ -68,26 +71,9 @@ pub(crate) const EFFECTS: [Draw; 25] = [
     motion_smear,
 ];
 
-/// `SplitMix64` (Steele, Lea, Flood 2014).
-pub(crate) struct Dice(pub(crate) u64);
-
-impl Dice {
-    pub(crate) fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Evenly in the logarithm.
-    pub(crate) fn decades(&mut self, low: f64, high: f64) -> f64 {
-        10.0_f64.powf(self.uniform(low, high))
-    }
-}
-
-pub(crate) const REGION: Region =
+pub(super) const REGION: Region =
     Region { x_m: (-0.02, 0.02), y_m: (-0.02, 0.02), theta_max_rad: 1.0 };
-pub(crate) const RATE_HZ: u32 = 2000;
+pub(super) const RATE_HZ: u32 = 2000;
 
 /// The photocurrent of a radiance of one in the rig of the bench, amperes.
 fn current_per_radiance() -> f64 {
@@ -255,6 +241,25 @@ fn flicker_noise(dice: &mut Dice) -> Case {
     case
 }
 
+/// One of the factors from radiance to counts.
+fn data_sheet(dice: &mut Dice) -> Case {
+    let names = ["responsivity", "pupil-size", "spot-size", "distance", "gain[0]"];
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below five
+    let which = dice.uniform(0.0, names.len() as f64) as usize;
+    let (mut case, _) = of_even(names[which], dice, Measure::Seeds);
+    // Beyond some hundredths a draw is not far from zero, which is refused.
+    let u = dice.decades(-7.0, -1.5);
+    let detector = &mut case.nominal.detector;
+    match which {
+        0 => detector.u_responsivity_relative = u,
+        1 => detector.u_pupil_radius_m = u * detector.pupil_radius_m,
+        2 => detector.u_spot_radius_m = u * detector.spot_radius_m,
+        3 => detector.u_distance_m = u * detector.distance_m,
+        _ => detector.gains[0].u_relative = u,
+    }
+    case
+}
+
 fn theta_zero(dice: &mut Dice) -> Case {
     let mut case = of_lobe("theta-zero", dice, Measure::Seeds);
     case.nominal.axes[0].u_zero = dice.decades(-8.0, -2.0);
@@ -264,6 +269,12 @@ fn theta_zero(dice: &mut Dice) -> Case {
 fn theta_homing(dice: &mut Dice) -> Case {
     let mut case = of_lobe("theta-homing", dice, Measure::Seeds);
     case.nominal.axes[0].u_homing = dice.decades(-8.0, -2.0);
+    case
+}
+
+fn theta_scale(dice: &mut Dice) -> Case {
+    let mut case = of_lobe("theta-scale", dice, Measure::Seeds);
+    case.nominal.axes[0].u_readback = dice.decades(-8.0, -2.0);
     case
 }
 

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use firmware_protocol::{Board, Illumination, Instant, Shutter};
 use sim::{BoundUnit, Compiled, SimulatedBoard, Terms, compile};
 
+use super::Weighed;
+use super::dice::Dice;
+use super::rigs::{Case, Measure, RATE_HZ, REGION};
 use crate::bench::counts;
-use crate::cases::{Case, Dice, Measure, RATE_HZ, REGION};
 
 /// θ and φ, degrees; x, metres.
 type Pose = [f64; 3];
@@ -27,7 +29,25 @@ impl Case {
         Arc::new(compiled.expect("a sound rig"))
     }
 
-    pub(crate) fn bound(&self) -> f64 {
+    pub(super) fn weighed(&self, dice: &mut Dice) -> Weighed {
+        Weighed {
+            effect: self.effect.to_owned(),
+            bound: self.bound(),
+            found: self.true_influence(dice),
+            // Of a root mean square of n normal numbers: beyond it once in a million (chi-squared).
+            chance: match self.measure {
+                Measure::Dwells => 1.18,
+                Measure::Seeds | Measure::Moved(_) => 1.8,
+                Measure::Poses(_) | Measure::Moments | Measure::Switched | Measure::Sides => {
+                    1.0 + 1e-6
+                }
+            },
+            // The converter's counts.
+            seen: 1e-8,
+        }
+    }
+
+    fn bound(&self) -> f64 {
         let compiled = self.compile(true, 1);
         let row = compiled.effects().iter().find(|row| row.name == self.effect).expect("a row");
         assert!(row.included && row.cause.is_some(), "{row:?}");
@@ -53,7 +73,7 @@ impl Case {
         self.nominal.detector.gains[0].full_scale_a / 2.0_f64.powi(31)
     }
 
-    pub(crate) fn true_influence(&self, dice: &mut Dice) -> f64 {
+    fn true_influence(&self, dice: &mut Dice) -> f64 {
         let pair = |seed| [true, false].map(|is_in| Bench::new(self, &self.compile(is_in, seed)));
         let largest = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
         let poses = self.poses(dice);

@@ -1,5 +1,5 @@
-//! Random scenes, each with one effect of light whose influence is spread over eight decades, and the
-//! search for its true influence.
+//! Random scenes, each with one effect of light whose influence is spread over eight decades, and
+//! the search for its true influence.
 
 use core::f64::consts::PI;
 use std::fmt::Write as _;
@@ -8,36 +8,17 @@ use glam::DVec3;
 use sim::{Axis, Compiled, Nominal, Quantity, Ray, Region, Scene, Simulated, Terms, compile};
 use spanned_toml::{Document, Source};
 
+use super::Weighed;
+use super::dice::Dice;
+use crate::bench::exact_rig;
+
 /// A scene and the effect that is weighed in it.
-pub(crate) struct Case {
-    pub(crate) effect: &'static str,
-    pub(crate) scene: String,
+pub(super) struct Case {
+    pub(super) effect: &'static str,
+    pub(super) scene: String,
     /// Axes at which the effect is likely to be the strongest: x and y in mm, θ and φ in radians.
     likely: Vec<[f64; 4]>,
     has_beam: bool,
-}
-
-/// What was stated and what was found.
-pub(crate) struct Weighed {
-    pub(crate) bound: f64,
-    pub(crate) found: f64,
-}
-
-/// `SplitMix64` (Steele, Lea, Flood 2014).
-pub(crate) struct Dice(pub(crate) u64);
-
-impl Dice {
-    fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Evenly in the logarithm.
-    fn decades(&mut self, low: f64, high: f64) -> f64 {
-        10.0_f64.powf(self.uniform(low, high))
-    }
 }
 
 const HALF_MM: f64 = 10.0;
@@ -45,17 +26,11 @@ const THETA_MAX: f64 = 1.0;
 const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-50, 50]\n\
                      y_mm = [-50, 50]\n";
 
-/// The `i`-th: kinds take turns.
-pub(crate) fn draw(i: u64) -> Case {
-    let mut dice = Dice(i * 7919);
-    match i % 6 {
-        0 => weak_lamp(&mut dice),
-        1 | 2 => shadow(&mut dice),
-        3 => window(&mut dice),
-        4 => lamp_in_beam(&mut dice),
-        _ => finite_beam(&mut dice),
-    }
-}
+pub(super) type Draw = fn(&mut Dice) -> Case;
+
+/// Shadows are tried twice: of a disk and of a ball.
+pub(super) const EFFECTS: [Draw; 7] =
+    [weak_lamp, shadow, shadow, window, lamp_in_beam, beam_shadow, finite_beam];
 
 fn case(effect: &'static str, scene: String) -> Case {
     Case { effect, scene, likely: Vec::new(), has_beam: false }
@@ -138,6 +113,20 @@ fn lamp_in_beam(dice: &mut Dice) -> Case {
     Case { likely: vec![[0.0, 0.0, theta, phi]], ..case("lamp-in-beam[0]", scene) }
 }
 
+/// Of a ball of some millimetres between sample and detector: where it hides the sample, all.
+fn beam_shadow(dice: &mut Dice) -> Case {
+    let (x, y, z) = (dice.uniform(-60.0, 60.0), dice.uniform(-60.0, 60.0), 150.0);
+    let radius = dice.decades(0.0, 1.3);
+    let scene = format!(
+        "[[emitter]]\nkind = \"lambertian\"\nx_mm = [-90, 90]\ny_mm = [-90, 90]\n\
+         radiance_w_per_m2_sr = 10\n\
+         [[occluder]]\nkind = \"sphere\"\ncentre_mm = [{x}, {y}, {z}]\nradius_mm = {radius}\n"
+    );
+    let away = DVec3::new(x, y, z);
+    let (theta, phi) = ((away.truncate().length() / z).atan(), y.atan2(x));
+    Case { likely: vec![[0.0, 0.0, theta, phi]], ..case("beam-shadow[0]", scene) }
+}
+
 /// Over a lobe that is hardly one, or is steep; and near an outline.
 fn finite_beam(dice: &mut Dice) -> Case {
     let exponent = dice.decades(-6.0, 2.0);
@@ -153,10 +142,25 @@ fn finite_beam(dice: &mut Dice) -> Case {
     Case { likely, has_beam: true, ..case("finite-beam", scene) }
 }
 
-pub(crate) fn read(text: &str) -> Scene {
+fn read(text: &str) -> Scene {
     let document = Document::parse(Source::new("scene.toml", text)).unwrap();
     let load = |name: &str| Err(format!("{name}: no such file"));
     Scene::read(&document, Quantity::Radiance, &load).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// One range, whose counts alone are the noise floor.
+fn rig() -> Nominal {
+    let mut nominal = exact_rig();
+    nominal.detector.adc_bits = 32;
+    nominal.detector.gains.truncate(1);
+    nominal
+}
+
+/// The standard deviation of a dwell's mean in the dark, amperes.
+fn floor_a(nominal: &Nominal) -> f64 {
+    let (detector, dwell_s) = (&nominal.detector, Terms::default().dwell_s);
+    let count_a = detector.gains[0].full_scale_a / 2.0_f64.powi(31);
+    count_a / (12.0 * dwell_s * f64::from(detector.adc_rate_hz)).sqrt()
 }
 
 impl Case {
@@ -179,8 +183,10 @@ impl Case {
     }
 
     /// The bound of its row, and the largest influence that a search finds.
-    pub(crate) fn weighed(&self, nominal: &Nominal, seed: u64) -> Weighed {
-        let (with, without) = self.compiled(nominal);
+    pub(super) fn weighed(&self, dice: &mut Dice) -> Weighed {
+        let nominal = rig();
+        let (with, without) = self.compiled(&nominal);
+        let floor = floor_a(&nominal) / with.current_per_radiance();
         let row = with.effects().iter().find(|row| row.name == self.effect).expect("a row");
         assert!(row.included && row.cause.is_some(), "{row:?}");
         let bound = row.bound.expect("a bound").value;
@@ -188,15 +194,20 @@ impl Case {
             let ray = Ray::new(at[0] * 1e-3, at[1] * 1e-3, at[2], at[3]);
             let axis = Axis { spot: ray.point, direction: ray.direction };
             let (a, b) = (with.seen_radiance(&axis), without.seen_radiance(&axis));
-            let reading = a.max(b);
-            if reading > 0.0 { (a - b).abs() / reading } else { 0.0 }
+            (a - b).abs() / a.max(b).max(floor)
         };
-        Weighed { bound, found: self.search(&influence, seed) }
+        Weighed {
+            effect: self.effect.to_owned(),
+            bound,
+            found: self.search(&influence, dice),
+            chance: 1.0 + 1e-9,
+            // Rounding.
+            seen: 1e-9,
+        }
     }
 
     /// At the likely places, at random ones, and uphill from the best of them.
-    fn search(&self, influence: &dyn Fn(&[f64; 4]) -> f64, seed: u64) -> f64 {
-        let mut dice = Dice(seed);
+    fn search(&self, influence: &dyn Fn(&[f64; 4]) -> f64, dice: &mut Dice) -> f64 {
         let within = |at: [f64; 4]| {
             let side = |x: f64| x.clamp(-HALF_MM, HALF_MM);
             [side(at[0]), side(at[1]), at[2].clamp(0.0, THETA_MAX), at[3]]
