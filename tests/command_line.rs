@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 
 use bench::{Bench, Said};
 
-const COMMANDS: [&str; 19] = [
-    "run", "resume", "fit", "export", "plan", "frontier", "explain", "sim", "ports", "home", "jog",
-    "read", "daemon", "submit", "status", "watch", "pause", "continue", "abort",
+const COMMANDS: [&str; 20] = [
+    "run", "resume", "fit", "report", "export", "plan", "frontier", "explain", "sim", "ports",
+    "home", "jog", "read", "daemon", "submit", "status", "watch", "pause", "continue", "abort",
 ];
 
 /// A bench that looks like a fresh clone, with a run that is done.
@@ -60,7 +60,7 @@ fn examples_that_need_no_rig_and_no_daemon_work_as_they_are_written() {
         let said = bench.gonio(&arguments).well();
         assert!(!said.out.is_empty(), "{said}");
     }
-    for command in ["resume", "fit", "export"] {
+    for command in ["resume", "fit", "report", "export"] {
         let example = example_of(&bench, command);
         let of_a_run = example.iter().map(|argument| match argument.as_str() {
             argument if argument.starts_with("runs/") => "out",

@@ -41,6 +41,7 @@ fn leaves_a_whole_folder(example: &str) {
         "fit.json",
         "plan.toml",
         "readings.csv",
+        "report.html",
         "rig.toml",
         "run.sqlite",
         "samples.csv",

@@ -35,6 +35,10 @@ pub(crate) enum Command {
     ///
     /// Example: gonio fit runs/luminaire-20261122T101500Z --at rays.csv
     Fit(FitArgs),
+    /// Render a run's report.html again, from its journal.
+    ///
+    /// Example: gonio report runs/luminaire-20261122T101500Z
+    Report(ReportArgs),
     /// Write a run's samples in another form.
     ///
     /// Example: gonio export runs/luminaire-20261122T101500Z --format csv -o samples.csv
@@ -199,6 +203,21 @@ pub(crate) struct FitArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Print fit.json.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// The run's folder.
+    pub(crate) dir: PathBuf,
+    /// Where to write it; - for standard output. Default: report.html in the run's folder.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write every picture to this folder too, each as an SVG file of its own.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
+    /// Print what was written as one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -21,6 +21,7 @@ mod plan;
 mod ports;
 mod progress;
 mod remote;
+mod report;
 mod results;
 mod resume;
 mod run;
@@ -45,6 +46,7 @@ pub fn main() -> ExitCode {
         Command::Sim(args) => simulated::sim(&args),
         Command::Ports(args) => ports::ports(&args),
         Command::Fit(args) => fit::fit(&args),
+        Command::Report(args) => report::report(&args),
         Command::Export(args) => export::export(&args),
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),

@@ -8,6 +8,7 @@ use fit::{BasisSpec, FitError, Optics, Region};
 
 use super::failure::Failure;
 use super::folder::JOURNAL;
+use super::report::{self, REPORT, RunRecord};
 use super::setup::Setup;
 use crate::export::{
     AccuracyPoint, ExportError, FitFile, SamplesMeta, TruePeak, Truth, write_accuracy,
@@ -35,6 +36,8 @@ pub(crate) struct Results {
     /// How far the fit lies from the truth, where there is both, and any light.
     pub(crate) score: Option<Score>,
     pub(crate) accuracy: Vec<AccuracyPoint>,
+    /// What the fit gives each sample's reading, in the samples' order; empty without a fit.
+    pub(crate) levels: Vec<f64>,
 }
 
 impl Results {
@@ -44,16 +47,17 @@ impl Results {
         let mut calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
         let (region, basis, optics) = (fit_region(setup), basis(spec), optics(setup));
         let fitted = calibrated.fit(&region, basis, optics.as_ref());
-        if let Ok(fitted) = &fitted {
-            calibrated.restate_from(&fitted.fit, optics.as_ref());
-        }
+        let levels = match &fitted {
+            Ok(fitted) => calibrated.restate_from(&fitted.fit, optics.as_ref()),
+            Err(_) => Vec::new(),
+        };
         if let Some(optics) = &optics {
             calibrated.flag_off_sample(optics);
         }
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
         let accuracy = accuracy(&calibrated, &region, basis, optics.as_ref());
-        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy })
+        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy, levels })
     }
 
     /// Samples that carry a flag.
@@ -66,19 +70,18 @@ impl Results {
         &self,
         folder: &Path,
         setup: &Setup,
-        header: &Header,
-        readings: &[Reading],
+        record: &RunRecord<'_>,
     ) -> Result<(), Failure> {
-        self.write_files(folder, setup, header, readings).map_err(Failure::midway)
+        self.write_files(folder, setup, record).map_err(Failure::midway)
     }
 
     fn write_files(
         &self,
         folder: &Path,
         setup: &Setup,
-        header: &Header,
-        readings: &[Reading],
+        record: &RunRecord<'_>,
     ) -> Result<(), ExportError> {
+        let RunRecord { header, readings, .. } = *record;
         let quantity = setup.rig.detector.quantity;
         write_atomically(&folder.join("samples.csv"), |out| {
             write_samples(out, quantity, &self.calibrated.samples)
@@ -93,7 +96,8 @@ impl Results {
         if let Ok(fitted) = &self.fitted {
             self.write_fit(&folder.join("fit.json"), setup, fitted)?;
         }
-        Ok(())
+        let report = report::of(setup, self, record);
+        write_atomically(&folder.join(REPORT), |out| report.write(out))
     }
 
     /// Writes what samples.csv can't say in columns.

@@ -9,6 +9,7 @@ use super::failure::{Failure, Outcome};
 use super::folder::{create, default_folder, exists_already};
 use super::outlook::warning;
 use super::output::{note, say, say_json};
+use super::report::RunRecord;
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::stopping;
@@ -72,7 +73,9 @@ pub(crate) fn finish(
         Err(_) if !is_as_planned => return Err(interrupted(folder, &outcome)),
         results => results?,
     };
-    results.write(folder, setup, &journal.reader().header()?, &readings)?;
+    let (header, sessions) = (journal.reader().header()?, journal.reader().sessions()?);
+    let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+    results.write(folder, setup, &record)?;
     let closed = journal.close();
     let summary = Summary {
         folder,

@@ -9,6 +9,7 @@ use super::acquire::Pace;
 use super::failure::Failure;
 use super::folder::{JOURNAL, create};
 use super::inputs::Bundle;
+use super::report::RunRecord;
 use super::results::{Results, read_run, targets_planned};
 use super::resume::{self, what_is_left};
 use super::run::first_job;
@@ -195,7 +196,9 @@ impl Shop {
     fn evaluate(&self, folder: &Path) -> Result<Finished, Failure> {
         let (setup, header, readings) = read_run(folder)?;
         let results = Results::of(&setup, setup.plan.fit, &readings)?;
-        results.write(folder, &setup, &header, &readings)?;
+        let sessions = Reader::open(&folder.join(JOURNAL))?.sessions()?;
+        let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+        results.write(folder, &setup, &record)?;
         let (measured, planned) = (results.calibrated.samples.len(), targets_planned(&setup));
         let fit = match &results.fitted {
             Ok(fitted) => {
@@ -205,7 +208,7 @@ impl Shop {
             }
             Err(error) => format!("no fit: {error}"),
         };
-        let rule = rule_met(&Reader::open(&folder.join(JOURNAL))?.sessions()?);
+        let rule = rule_met(&sessions);
         let missed = stopping::missed(&setup, &results);
         let mut summary = format!("{measured} of {planned} targets measured; {fit}");
         if let Some(rule) = &rule {

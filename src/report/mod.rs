@@ -1,5 +1,24 @@
-//! Pictures of what was measured. They do not know where the numbers came from.
+//! Pictures of what was measured, and the page that holds them. They do not know where the numbers
+//! came from: they are handed numbers, words and functions of direction.
 
+mod bars;
+mod chart;
+mod colour;
+mod coverage;
 mod frontier;
+mod hemisphere;
+mod page;
+mod plane;
+mod polar;
+mod raster;
+mod svg;
+mod ticks;
 
+pub use bars::Budget;
+pub use chart::{Chart, Series, Stroke};
 pub use frontier::frontier_svg;
+pub use hemisphere::Hemisphere;
+pub use page::{Report, Section, Table};
+pub use plane::Plane;
+pub use polar::Polar;
+pub use svg::Picture;

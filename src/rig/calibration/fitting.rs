@@ -36,13 +36,15 @@ impl Calibrated {
         Self { samples, ..self.clone() }
     }
 
-    /// States every sample's uncertainty at the level that the fit gives its reading.
-    pub fn restate_from(&mut self, fit: &Fit, optics: Option<&Optics>) {
+    /// States every sample's uncertainty at the level that the fit gives its reading; answers the
+    /// levels, in the samples' order.
+    pub fn restate_from(&mut self, fit: &Fit, optics: Option<&Optics>) -> Vec<f64> {
         let rays: Vec<Ray> = self.samples.iter().map(Sample::ray).collect();
         // What optics are wrong with has been said by the fit.
         let levels = optics.and_then(|optics| fit.readings(&rays, optics).ok());
         let levels = levels.unwrap_or_else(|| rays.iter().map(|ray| fit.value(ray)).collect());
         self.restate(|i, _| levels[i]);
+        levels
     }
 
     /// Flags the samples whose beam reaches beyond the sample's outline, where that is known.

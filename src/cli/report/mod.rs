@@ -1,0 +1,118 @@
+//! A run's report: its results as plain numbers, words and functions, handed to the room that draws.
+//! And `gonio report`, which renders it again from the journal.
+
+mod course;
+mod facts;
+mod fields;
+mod flagged;
+mod quantities;
+mod words;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde_json::json;
+
+use super::args::ReportArgs;
+use super::failure::{Failure, Outcome};
+use super::folder::JOURNAL;
+use super::output::{say, say_json, write_out};
+use super::results::{Results, read_run};
+use super::setup::Setup;
+use super::text::{row, table};
+use crate::export::write_atomically;
+use crate::journal::{Header, Reader, Session};
+use crate::report::{Report, Section};
+use crate::rig::Reading;
+
+/// The file in a run's folder.
+pub(crate) const REPORT: &str = "report.html";
+
+/// What a run's journal says of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunRecord<'a> {
+    pub(crate) header: &'a Header,
+    pub(crate) readings: &'a [Reading],
+    pub(crate) sessions: &'a [Session],
+}
+
+/// Renders a run's report again.
+pub(crate) fn report(args: &ReportArgs) -> Outcome {
+    let (setup, header, readings) = read_run(&args.dir)?;
+    let sessions = Reader::open(&args.dir.join(JOURNAL))?.sessions()?;
+    let results = Results::of(&setup, setup.plan.fit, &readings)?;
+    let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+    let report = of(&setup, &results, &record);
+    let output = args.output.clone().unwrap_or_else(|| args.dir.join(REPORT));
+    if output == Path::new("-") {
+        write_out(|out| report.write(out))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    write_atomically(&output, |out| report.write(out)).map_err(Failure::midway)?;
+    if let Some(folder) = &args.pictures {
+        write_pictures(folder, &report)?;
+    }
+    let names: Vec<&str> = report.pictures().map(|picture| picture.name).collect();
+    if args.json {
+        say_json(&json!({
+            "run": header.plan_name,
+            "simulated": header.simulated,
+            "report": output.display().to_string(),
+            "pictures": names,
+        }))?;
+    } else {
+        let rows =
+            [row("pictures", names.join(", ")), row("written to", output.display().to_string())];
+        say(&table(&rows))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Each picture in a file of its own.
+fn write_pictures(folder: &Path, report: &Report) -> Result<(), Failure> {
+    let cannot = |error| {
+        Failure::midway(format!("{}: the folder cannot be made: {error}", folder.display()))
+    };
+    std::fs::create_dir_all(folder).map_err(cannot)?;
+    for picture in report.pictures() {
+        let path = folder.join(picture.name).with_extension("svg");
+        write_atomically(&path, |out| out.write_all(picture.document().as_bytes()))
+            .map_err(Failure::midway)?;
+    }
+    Ok(())
+}
+
+/// The report of a run.
+pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Report {
+    let length_s = facts::rig_time_s(results, record);
+    let mut sections = Vec::new();
+    match &results.fitted {
+        Ok(fitted) => {
+            sections.push(Section {
+                title: "Results".to_owned(),
+                table: quantities::table(setup, results, fitted),
+                items: facts::notes(setup, results),
+                ..Section::default()
+            });
+            sections.push(fields::section(setup, results, fitted));
+            sections.extend(fields::budget(setup, fitted));
+            sections.extend(course::accuracy(setup, results));
+            sections.extend(course::residuals(setup, results, length_s));
+        }
+        Err(error) => sections.push(Section {
+            title: "Results".to_owned(),
+            paragraphs: vec![format!("There is no fit: {error}")],
+            items: facts::notes(setup, results),
+            ..Section::default()
+        }),
+    }
+    sections.extend(course::signal(setup, results, record.readings, length_s));
+    sections.extend(flagged::section(setup, results));
+    sections.extend(flagged::effects(setup));
+    Report {
+        title: format!("{}: {}", record.header.plan_name, record.header.rig_name),
+        banners: facts::banners(setup, results, record),
+        facts: facts::facts(setup, results, record),
+        sections,
+    }
+}
