@@ -65,6 +65,11 @@ pub(crate) trait Field: fmt::Debug + Send + Sync {
         None
     }
 
+    /// Radiance along a ray from one of the patches, by its place among them, as if it had no end.
+    fn on_patch(&self, _: usize, ray: &Ray) -> f64 {
+        self.radiance(ray)
+    }
+
     /// Whether what leaves each place goes alike into all directions, and all places lie in the plane.
     fn is_even(&self) -> bool {
         false
@@ -82,24 +87,56 @@ pub(crate) struct Patch {
     /// What calls it into being: its key in scene.toml.
     pub(crate) name: String,
     pub(crate) boundary: Boundary,
-    /// A place within. Its radiance goes with direction alone.
+    /// A place within.
     pub(crate) place: DVec2,
-    /// Whether its radiance is the same all round the normal.
-    pub(crate) is_round: bool,
-    /// Its radiance, where that is one in all places and directions.
-    pub(crate) uniform: Option<f64>,
+    pub(crate) goes: Goes,
+}
+
+/// With what the radiance of a patch goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Goes {
+    /// With nothing: this is it.
+    Even(f64),
+    /// With direction alone; whether it is the same all round the normal.
+    WithDirection { is_round: bool },
+    /// With the place alone.
+    WithPlace,
+    /// With both.
+    WithBoth,
+}
+
+impl Patch {
+    /// Of an emitter in the sample's plane, the `i`-th of its scene. `None` for another one, and for an
+    /// image, which has outlines within.
+    pub(crate) fn of_emitter(i: usize, emitter: &Emitter) -> Option<Self> {
+        let shape = emitter.shape().filter(|_| emitter.texture().is_none())?;
+        let ((x0, x1), (y0, y1)) = shape.bounding_box();
+        let (x, y) = (f64::midpoint(x0, x1), f64::midpoint(y0, y1));
+        let goes = match emitter.law() {
+            Law::Lambertian => Goes::Even(emitter.radiance_into(x, y, DVec3::Z)),
+            law => Goes::WithDirection { is_round: law.is_round() },
+        };
+        Some(Self::new(format!("emitter[{i}]"), shape, goes))
+    }
+
+    pub(crate) fn new(name: String, shape: &Shape, goes: Goes) -> Self {
+        let boundary = Boundary::of(shape);
+        Self { name, place: boundary.place_within(), boundary, goes }
+    }
 }
 
 /// What leaves one place of a field, as if it left every place.
 #[derive(Debug)]
 pub(crate) struct OfPlace {
     pub(crate) field: Arc<dyn Field>,
+    /// The place's patch, by its place among them.
+    pub(crate) patch: usize,
     pub(crate) place: DVec3,
 }
 
 impl Field for OfPlace {
     fn radiance(&self, ray: &Ray) -> f64 {
-        self.field.radiance(&Ray { point: self.place, ..*ray })
+        self.field.on_patch(self.patch, &Ray { point: self.place, ..*ray })
     }
 }
 
@@ -135,26 +172,14 @@ impl Field for Scene {
     }
 
     fn patches(&self) -> Option<Vec<Patch>> {
-        let patch = |(i, emitter): (usize, &Emitter)| {
-            let shape = emitter.shape().filter(|_| emitter.texture().is_none())?;
-            let ((x0, x1), (y0, y1)) = shape.bounding_box();
-            let (x, y) = (f64::midpoint(x0, x1), f64::midpoint(y0, y1));
-            let boundary = match shape {
-                Shape::Disk { x_m, y_m, radius_m } => {
-                    Boundary::Circle { centre: DVec2::new(*x_m, *y_m), radius: *radius_m }
-                }
-                Shape::Polygon(outline) => {
-                    Boundary::Polygon(outline.corners_m().iter().map(|c| DVec2::from(*c)).collect())
-                }
-                Shape::Rectangle { x_m, y_m } => Boundary::of_rectangle(*x_m, *y_m),
-            };
-            let is_even = matches!(emitter.law(), Law::Lambertian);
-            let uniform = is_even.then(|| emitter.radiance_into(x, y, DVec3::Z));
-            let place = boundary.place_within();
-            let (name, is_round) = (format!("emitter[{i}]"), emitter.law().is_round());
-            Some(Patch { name, boundary, place, is_round, uniform })
-        };
-        self.emitters().iter().enumerate().map(patch).collect()
+        let emitters = self.emitters().iter().enumerate();
+        emitters.map(|(i, emitter)| Patch::of_emitter(i, emitter)).collect()
+    }
+
+    fn on_patch(&self, patch: usize, ray: &Ray) -> f64 {
+        let emitter = self.emitters().get(patch);
+        emitter
+            .map_or(0.0, |emitter| emitter.radiance_into(ray.point.x, ray.point.y, ray.direction))
     }
 
     fn brightest(&self, region: &Region) -> f64 {

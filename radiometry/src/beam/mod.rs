@@ -8,6 +8,7 @@
 //! Frame of a beam: the axis is +z towards the detector; the origin is the point of the axis at
 //! which the detector looks. Lengths in metres.
 
+mod directions;
 mod footprint;
 mod rule;
 

@@ -91,12 +91,25 @@ impl Beam {
     /// # Ok::<(), radiometry::DomainError>(())
     /// ```
     pub fn rule(&self, degree: usize) -> BeamRule {
-        let disk = disk_rule(degree);
+        self.rule_of(degree, degree)
+    }
+
+    /// The same with a degree for each disk: what goes with the place on the spot alone, as on a
+    /// Lambertian surface, needs many places and few directions.
+    ///
+    /// ```
+    /// use radiometry::beam::Beam;
+    /// let rule = Beam::of_spot(0.01, 0.005, 0.2)?.rule_of(14, 3);
+    /// assert_eq!(rule.rays().len(), 60 * 4);
+    /// # Ok::<(), radiometry::DomainError>(())
+    /// ```
+    pub fn rule_of(&self, stop_degree: usize, pupil_degree: usize) -> BeamRule {
+        let (stop_rule, pupil_rule) = (disk_rule(stop_degree), disk_rule(pupil_degree));
         let h = self.separation_m;
-        let mut rays = Vec::with_capacity(disk.len() * disk.len());
+        let mut rays = Vec::with_capacity(stop_rule.len() * pupil_rule.len());
         let mut sum = Sum::default();
-        for (on_stop, stop_weight) in &disk {
-            for (on_pupil, pupil_weight) in &disk {
+        for (on_stop, stop_weight) in &stop_rule {
+            for (on_pupil, pupil_weight) in &pupil_rule {
                 let stop = *on_stop * self.stop_radius_m;
                 let across = *on_pupil * self.pupil_radius_m - stop;
                 let r2 = h * h + across.length_squared();

@@ -21,6 +21,8 @@ pub struct Compiled {
     pub(super) seen: Arc<dyn Field>,
     /// What leaves the sample.
     pub(super) field: Arc<dyn Field>,
+    /// The names of the effects of light: without one of them, something else is seen.
+    pub(super) light: Vec<String>,
     pub(crate) optics: Arc<dyn Optics>,
     pub(crate) chosen: Chosen,
     pub(super) region: Region,
@@ -40,7 +42,7 @@ impl Compiled {
         less.chosen = self.chosen.less(effect)?;
         // What was drawn before was sound; less of it is.
         less.drawn = Drawn::new(&self.nominal, &self.simulated, self.seed, &less.chosen).ok()?;
-        if !self.scene.is_flat_emitters() {
+        if self.light.iter().any(|name| name == effect) {
             let is_in = |name: &str| less.chosen.has(name);
             let distance_m = Some(self.nominal.detector.distance_m);
             less.seen = light::field(&self.scene, distance_m, &is_in).ok()?;

@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub use compiled::Compiled;
 pub use error::CompileError;
 
-pub(crate) use setting::Setting;
+pub(crate) use setting::{PART_OF_NOISE, Setting};
 
 use crate::check::check;
 use crate::effect::decide;
@@ -37,14 +37,19 @@ pub fn compile(
     let tolerance = setting.tolerance;
     let mut beam = Light::of(&setting).map_err(CompileError::Beam)?;
     let mut candidates = core::mem::take(&mut beam.candidates);
-    candidates.extend(light::candidates(&setting)?);
+    let of_light = light::candidates(&setting)?;
+    let light: Vec<String> = of_light.iter().map(|own| own.name.clone()).collect();
+    let called: Vec<String> =
+        of_light.iter().filter(|own| own.cause.is_some()).map(|own| own.name.clone()).collect();
+    candidates.extend(of_light);
     candidates.extend(mechanics::candidates(&setting));
     candidates.extend(time::candidates(&setting));
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
     let is_in = |name: &str| chosen.has(name);
     setting.field = light::field(&scene, Some(nominal.detector.distance_m), &is_in)?;
-    let (region, optics) = (setting.region, beam.optics(&setting, &chosen));
+    let is_whole = called.iter().all(|name| chosen.has(name));
+    let (region, optics) = (setting.region, beam.optics(&setting, &chosen, is_whole));
     let (seen, field) = (Arc::clone(&setting.field), light::field(&scene, None, &is_in)?);
     let (seed, drawn) = (terms.seed, Drawn::new(&nominal, &simulated, terms.seed, &chosen)?);
     Ok(Compiled {
@@ -55,6 +60,7 @@ pub fn compile(
         drawn,
         seen,
         field,
+        light,
         optics,
         chosen,
         region,

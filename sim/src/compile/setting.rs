@@ -34,7 +34,7 @@ pub(crate) struct Setting<'s> {
 }
 
 /// What is left out must not show beside the noise of one dwell.
-const PART_OF_NOISE: f64 = 0.1;
+pub(crate) const PART_OF_NOISE: f64 = 0.1;
 
 impl<'s> Setting<'s> {
     pub(super) fn new(
@@ -70,6 +70,11 @@ impl<'s> Setting<'s> {
     /// The largest photocurrent of the region, amperes.
     pub(crate) fn brightest_a(&self) -> f64 {
         self.brightest * self.current_per_radiance
+    }
+
+    /// Predicted standard deviation of a dwell's mean at a radiance, as a radiance.
+    pub(crate) fn noise(&self, radiance: f64) -> f64 {
+        self.noise_a(radiance * self.current_per_radiance) / self.current_per_radiance
     }
 
     /// Predicted standard deviation of a dwell's mean at a photocurrent, amperes: shot noise, read

@@ -5,6 +5,7 @@
 mod effects;
 mod lamps;
 mod landmarks;
+mod patches;
 mod plate;
 mod returned;
 
@@ -81,6 +82,12 @@ impl LitScene {
         if distance_m.is_some() {
             in_the_beam(scene, is_in, &mut parts);
         }
+        // What stands higher than the detector is met by no ray on its way there.
+        let reach_m = distance_m.unwrap_or(f64::INFINITY);
+        parts.retain(|part| match &part.body {
+            Body::Raised(solid) => solid.heights_m().0 < reach_m,
+            Body::Flat(_) => true,
+        });
         let (flat, raised) = parts.into_iter().partition(|part| part.body.shape().is_some());
         let windows = scene.windows().iter().enumerate().filter(|(i, window)| {
             let is_seen = distance_m.is_some() || window.belongs_to == WindowOwner::Sample;
@@ -91,7 +98,6 @@ impl LitScene {
         });
         let mut plates = plates.collect::<Result<Vec<_>, _>>()?;
         plates.sort_by(|a, b| b.low_m().total_cmp(&a.low_m()));
-        let reach_m = distance_m.unwrap_or(f64::INFINITY);
         let mut lit = Self { flat, raised, plates, returned: None, reach_m };
         lit.returned = lit.thrown_back(scene, is_in)?;
         Ok(lit)
@@ -198,6 +204,14 @@ impl Field for LitScene {
 
     fn landmarks(&self, region: &Region) -> Vec<Ray> {
         landmarks::of(self, region)
+    }
+
+    fn patches(&self) -> Option<Vec<crate::field::Patch>> {
+        self.flat_patches()
+    }
+
+    fn on_patch(&self, patch: usize, ray: &Ray) -> f64 {
+        self.of_flat_patch(patch, ray)
     }
 
     fn is_even(&self) -> bool {

@@ -3,6 +3,8 @@
 
 use glam::DVec2;
 
+use crate::scene::Shape;
+
 /// A closed curve in z = 0, metres, and the patch within.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Boundary {
@@ -15,6 +17,18 @@ pub(crate) enum Boundary {
 }
 
 impl Boundary {
+    pub(crate) fn of(shape: &Shape) -> Self {
+        match shape {
+            Shape::Disk { x_m, y_m, radius_m } => {
+                Self::Circle { centre: DVec2::new(*x_m, *y_m), radius: *radius_m }
+            }
+            Shape::Polygon(outline) => {
+                Self::Polygon(outline.corners_m().iter().map(|c| DVec2::from(*c)).collect())
+            }
+            Shape::Rectangle { x_m, y_m } => Self::of_rectangle(*x_m, *y_m),
+        }
+    }
+
     pub(crate) fn of_rectangle(x: (f64, f64), y: (f64, f64)) -> Self {
         let corner = DVec2::new;
         Self::Polygon(vec![corner(x.0, y.0), corner(x.1, y.0), corner(x.1, y.1), corner(x.0, y.1)])
@@ -36,14 +50,10 @@ impl Boundary {
 
     /// A point within: the middle of the longest part of a line across its middle.
     pub(crate) fn place_within(&self) -> DVec2 {
-        let (low, high) = match self {
-            Self::Circle { centre, .. } => return *centre,
-            Self::Polygon(corners) => corners
-                .iter()
-                .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), corner| {
-                    (low.min(*corner), high.max(*corner))
-                }),
-        };
+        if let Self::Circle { centre, .. } = self {
+            return *centre;
+        }
+        let (low, high) = self.bounds();
         // Not along an edge.
         let middle = low + (high - low) * 0.497;
         let mut ends = Vec::new();
@@ -52,6 +62,17 @@ impl Boundary {
             ends.chunks_exact(2).map(|part| (part[1] - part[0], f64::midpoint(part[0], part[1])));
         let longest = parts.reduce(|a, b| if b.0 > a.0 { b } else { a });
         middle + DVec2::X * longest.map_or(0.0, |(_, at)| at)
+    }
+
+    /// The upright rectangle round it: its lowest and highest corner.
+    pub(crate) fn bounds(&self) -> (DVec2, DVec2) {
+        match self {
+            Self::Circle { centre, radius } => (*centre - *radius, *centre + *radius),
+            Self::Polygon(corners) => {
+                let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+                corners.iter().fold(none, |(low, high), p| (low.min(*p), high.max(*p)))
+            }
+        }
     }
 
     /// How far the curve is from a point.

@@ -15,8 +15,6 @@ use radiometry::beam::{Beam, Placed};
 
 use super::boundary::{Boundary, edges};
 
-/// Points between two changes of shape; the error of a rim's area is below 1e-8 of the stop's.
-const CHORDS: usize = 8;
 /// Where a circle is looked at for crossings of the stop's rim.
 const LOOKS: u32 = 48;
 /// Halvings of the place of such a crossing, to the last bit.
@@ -32,11 +30,12 @@ pub(crate) struct Rules {
 }
 
 impl Rules {
-    /// With so many points along a chord.
-    pub(crate) fn new(along: usize) -> Self {
+    /// With so many chords between two changes of shape (with 8 the error of a rim's area is below
+    /// 1e-8 of the stop's), and so many points along each.
+    pub(crate) fn new(chords: usize, along: usize) -> Self {
         // On s in (-1, 1) the place is sin(πs/2): even so, its slope vanishes at both ends.
-        let across = radiometry::quadrature::gauss_legendre(CHORDS);
-        let roots = radiometry::quadrature::gauss_legendre(CHORDS + 4);
+        let across = radiometry::quadrature::gauss_legendre(chords);
+        let roots = radiometry::quadrature::gauss_legendre(chords + 4);
         let roots = roots.iter().map(|(s, weight)| {
             let (sin, cos) = libm::sincos(FRAC_PI_2 * s);
             (sin, weight * FRAC_PI_2 * cos)
@@ -249,7 +248,7 @@ mod tests {
     fn part(beam: &Beam, boundary: &Boundary, theta_deg: f64, along: usize, pupil: usize) -> f64 {
         let (sin, cos) = libm::sincos(theta_deg.to_radians());
         let placed = Placed::new(DVec3::ZERO, DVec3::new(0.6 * sin, 0.8 * sin, cos));
-        let rules = Rules::new(along);
+        let rules = Rules::new(8, along);
         let sum: f64 = disk_rule(pupil)
             .into_iter()
             .filter_map(|(at, w)| Some((Sight::new(beam, &rules, &placed, at)?, w)))

@@ -4,6 +4,9 @@
 mod beams;
 mod boundary;
 mod coverage;
+mod forms;
+mod poses;
+mod table;
 mod weigh;
 
 use core::fmt;
@@ -19,7 +22,8 @@ use crate::Scene;
 use crate::compile::Setting;
 use crate::effect::{Bound, BoundUnit, Candidate, Chosen, Influence};
 use crate::field::{Field, Ray};
-use weigh::{Form, Weighed};
+use forms::Form;
+use weigh::Weighed;
 
 /// The name of the effect that not the axis alone is seen.
 pub(crate) const FINITE_BEAM: &str = "finite-beam";
@@ -85,17 +89,22 @@ impl Light {
                 beam.fact
             )),
             influence: Influence::Relative(beam.bound),
-            error: form.map(|(_, error)| error),
-            how_in: form.map_or_else(String::new, |(form, error)| form.how(error)),
+            error: form.map(|(_, off)| off.relative),
+            how_in: form.map_or_else(String::new, |(form, off)| form.how(off)),
             how_out: "the radiance along the axis stands for the beam's".to_owned(),
         });
         Ok(Self { candidates, beam, form: form.map(|(form, _)| form) })
     }
 
-    /// The beam as chosen.
-    pub(crate) fn optics(&self, setting: &Setting<'_>, chosen: &Chosen) -> Arc<dyn Optics> {
+    /// The beam as chosen; `is_whole`: whether all is in that the light of the scene calls for.
+    pub(crate) fn optics(
+        &self,
+        setting: &Setting<'_>,
+        chosen: &Chosen,
+        is_whole: bool,
+    ) -> Arc<dyn Optics> {
         match self.form.filter(|_| chosen.has(FINITE_BEAM)) {
-            Some(form) => self.beam.build(setting, form),
+            Some(form) => self.beam.build(setting, form, is_whole),
             None => Arc::new(PointSampled(Arc::clone(&setting.field))),
         }
     }

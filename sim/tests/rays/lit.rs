@@ -101,6 +101,33 @@ fn the_beam_sees_the_shadow_and_what_casts_it() {
     }
 }
 
+/// Above the detector, so that their shadows alone are seen.
+#[test]
+fn the_beam_averages_a_penumbra_from_the_umbra_to_the_light() {
+    let lamp = "[[lamp]]\nkind = \"sphere\"\ncentre_mm = [0, 0, 1000]\nradius_mm = 12\n\
+                radiance_w_per_m2_sr = 5000\n";
+    for body in [
+        "kind = \"half-plane\"\nx_max_mm = 0\nz_mm = 500\n",
+        "kind = \"disk\"\ncentre_mm = [4, 0, 400]\naxis = [0, 0.3, 1]\nradius_mm = 9\n",
+        "kind = \"sphere\"\ncentre_mm = [0, 0, 400]\nradius_mm = 2\n",
+    ] {
+        let text = format!("{PANEL}{lamp}[[occluder]]\n{body}");
+        let both = Both::new(read(&text), &[], exact_rig());
+        let row = both.compiled.effects().iter().find(|row| row.name == "finite-beam").unwrap();
+        assert!(row.how.contains("table"), "{row:?}");
+        for (x, y, theta, phi) in [
+            (-9.0, 2.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0, 0.0),
+            (9.0, -4.0, 60.0, 10.0),
+            (3.0, 9.0, 72.0, 90.0),
+        ] {
+            let at = axis(x, y, theta, phi);
+            let what = format!("{body}at {x} {y}, {theta}°");
+            agree(&what, both.seen(&at, RAYS), 0.6, both.stated(), 4e-3);
+        }
+    }
+}
+
 #[test]
 fn a_wide_sun_has_penumbras_and_passes_glass() {
     let sun = |half_angle_deg: f64| {
