@@ -97,8 +97,6 @@ pub(crate) enum Influence {
     /// At most |with - without| / max(|reading|, noise floor) over the region, the larger of the
     /// two readings. Of something random, the standard deviation of a dwell's mean.
     Relative(f64),
-    /// A size in a unit of its own, which no tolerance compares with: in where it is called for.
-    Sized(Bound),
 }
 
 impl Candidate {
@@ -135,7 +133,6 @@ impl Candidate {
         match self.influence {
             Influence::Mandatory(bound) => bound,
             Influence::Relative(value) => Some(Bound { value, unit: BoundUnit::Relative }),
-            Influence::Sized(bound) => Some(bound),
         }
     }
 }
@@ -207,7 +204,7 @@ pub(crate) fn decide(
         .filter(|(i, _)| why[*i] == Why::CalledFor)
         .filter_map(|(i, candidate)| match candidate.influence {
             Influence::Relative(bound) => Some((bound, i)),
-            Influence::Mandatory(_) | Influence::Sized(_) => None,
+            Influence::Mandatory(_) => None,
         })
         .collect();
     weighed.sort_by(|a, b| a.0.total_cmp(&b.0));

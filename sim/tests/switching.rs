@@ -24,7 +24,7 @@ struct Rig {
 /// Sets an effect to a size, 1 being a plain one; 0 takes it away.
 type Set = fn(&mut Rig, f64);
 
-const EFFECTS: [(&str, Set); 26] = [
+const EFFECTS: [(&str, Set); 27] = [
     ("warm-up", |rig, size| {
         let amplitude_relative = 0.2 * size;
         rig.source.warm_up = (size > 0.0).then_some(WarmUp {
@@ -74,6 +74,9 @@ const EFFECTS: [(&str, Set); 26] = [
     ("theta-encoder-error", |rig, size| {
         let error = EncoderError { amplitude: 1e-2 * size, period: 0.3 };
         rig.simulated.axes[0].encoder_error = (size > 0.0).then_some(error);
+    }),
+    ("theta-settling", |rig, size| {
+        rig.simulated.axes[0].settle_s = (size > 0.0).then_some(0.3 * size);
     }),
     ("theta-settle-ringing", |rig, size| {
         let amplitude = 1e-2 * size;
@@ -252,4 +255,48 @@ fn what_is_left_out_is_not_there_to_run() {
             !others.contains(&format!("[{stage} {{")) && !others.contains(&format!(", {stage} {{"))
         );
     }
+}
+
+#[test]
+fn an_axis_that_settles_in_its_stated_time_is_left_out_and_one_that_does_not_is_in() {
+    const STATED_S: f64 = 0.05;
+    let compiled = |takes_s: Option<f64>, force: &[&str]| {
+        let mut nominal = exact_rig();
+        nominal.axes[0].settle_s = STATED_S;
+        let mut simulated = Simulated::default();
+        simulated.axes[0].settle_s = takes_s;
+        let force = force.iter().map(|name| (*name).to_owned()).collect();
+        let without = vec!["finite-beam".to_owned(), "shot-noise".to_owned()];
+        let terms = Terms { force, without, ..Terms::default() };
+        let scene = scene(SourceOverTime::default());
+        Arc::new(compile(scene, nominal, simulated, &terms).expect("sound"))
+    };
+    let row = |compiled: &Compiled, name: &str| {
+        let row = compiled.effects().iter().find(|row| row.name == name).unwrap();
+        (row.included, row.bound.unwrap().value)
+    };
+    // A move by 30° and a dwell when the stated time is over.
+    let reads = |compiled: &Arc<Compiled>| -> Vec<i32> {
+        let mut board = SimulatedBoard::new(Arc::clone(compiled), 0);
+        let illumination = Illumination { reading: 0, gain: 0, shutter: Shutter::Open };
+        for (channel, target) in (0..).zip(counts(30.0, 0.0, 0.0, 0.0).0) {
+            board.begin_motion(Instant::ZERO, channel, f64::from(target));
+            board.set_setpoint(Instant::ZERO, channel, f64::from(target));
+        }
+        board.begin_dwell(Instant::from_micros(50_000), illumination);
+        (1..=40).map(|k| board.convert(Instant::from_micros(50_000 + 500 * k)).unwrap()).collect()
+    };
+    for takes_s in [None, Some(STATED_S), Some(0.01)] {
+        let settles = compiled(takes_s, &[]);
+        assert_eq!(row(&settles, "theta-settling"), (false, 0.0), "{takes_s:?}");
+        let forced = compiled(takes_s, &["theta-settling"]);
+        assert!(row(&forced, "theta-settling").0);
+        assert_eq!(reads(&forced), reads(&settles), "{takes_s:?}");
+    }
+    let late = compiled(Some(0.08), &[]);
+    let (is_in, bound) = row(&late, "theta-settling");
+    assert!(is_in && bound > 1e-4, "{bound}");
+    assert!(row(&late, "motion-smear").1 > 0.0);
+    let (found, rest) = (reads(&late), reads(&compiled(None, &[])));
+    assert_ne!(found[0], rest[0], "it still comes in");
 }

@@ -74,7 +74,7 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         // A part of what is thrown back, which is a part of the reading.
         candidate.error = error.map(|error| match candidate.influence {
             Influence::Relative(influence) => error * influence,
-            Influence::Mandatory(_) | Influence::Sized(_) => error,
+            Influence::Mandatory(_) => error,
         });
         found.push(candidate);
     }

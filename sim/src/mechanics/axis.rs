@@ -13,6 +13,7 @@ use super::flaws::{AxisFlaws, ENCODER_ERROR, MISSED_STEPS};
 use super::play::Play;
 use super::ringing::Rings;
 use super::scale::{Lines, Periodic};
+use super::settling::Settling;
 use crate::NominalAxis;
 use crate::chance::{Stream, draw};
 use crate::switches::Switches;
@@ -29,7 +30,7 @@ pub(crate) struct AxisTruth {
     homing_counts: f64,
     lines: Option<Lines>,
     periodic: Option<Periodic>,
-    settle: Option<Settle>,
+    settling: Option<Settling>,
     rings: Option<Rings>,
     play: Option<Play>,
     misses: Option<Misses>,
@@ -48,18 +49,6 @@ struct Misses {
     counts: f64,
     effect: String,
 }
-
-/// After a stop the axis is behind by what its servo lags at the axis's acceleration, and comes
-/// in as (1 - t/T)³: at rest exactly after the stated time T.
-#[derive(Debug, Clone, PartialEq)]
-struct Settle {
-    time_s: f64,
-    lag_counts_max: f64,
-}
-
-/// A critically damped servo whose error falls as (1 - t/T)³ begins with a time constant of T/3:
-/// it lags a constant acceleration a by a (T/3)².
-const LAG_PART_OF_SETTLE: f64 = 1.0 / 3.0;
 
 impl AxisTruth {
     pub(crate) fn draw(
@@ -86,11 +75,7 @@ impl AxisTruth {
             .encoder_error
             .as_ref()
             .map(|error| Periodic::new(error, per_unit, &format!("{name}-{ENCODER_ERROR}"), seed));
-        let lag_s = axis.settle_s * LAG_PART_OF_SETTLE;
-        let settle = (axis.settle_s > 0.0).then(|| Settle {
-            time_s: axis.settle_s,
-            lag_counts_max: f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s,
-        });
+        let settling = Settling::new(axis, flaws.settle_s.unwrap_or(axis.settle_s));
         let mark_counts = zero * axis.u_zero * per_unit;
         // The travel is stated from the mark, wherever that really is.
         let beyond = limit_margin * (high - low);
@@ -102,7 +87,7 @@ impl AxisTruth {
             homing_counts: axis.u_homing * per_unit.abs(),
             lines,
             periodic,
-            settle,
+            settling,
             rings: flaws.ringing.as_ref().map(|ringing| Rings::new(ringing, per_unit)),
             play: (flaws.backlash > 0.0).then(|| Play::new(flaws.backlash * per_unit.abs())),
             misses: flaws.missed_steps.map(|missed| Misses {
@@ -114,12 +99,6 @@ impl AxisTruth {
             switch_counts: (mark_counts + low - beyond, mark_counts + high + beyond),
             speed_counts_per_s: f64::from(axis.speed_counts_per_s),
         }
-    }
-
-    /// How far the axis may be off when it stops, in units.
-    pub(crate) fn lag_units_max(axis: &NominalAxis) -> f64 {
-        let lag_s = axis.settle_s * LAG_PART_OF_SETTLE;
-        f64::from(axis.acceleration_counts_per_s2) * lag_s * lag_s / axis.counts_per_unit.abs()
     }
 
     /// The mark as it is found at the n-th homing of this boot, counts. By its number and not by
@@ -158,8 +137,8 @@ pub(crate) struct Axis {
     /// The mechanical position at setpoint zero, counts.
     origin_counts: f64,
     setpoint_counts: f64,
-    /// By how much the axis was behind its setpoint when that last moved, counts.
-    behind_counts: f64,
+    /// By how much the axis was ahead of its setpoint when that last moved, counts.
+    settles_counts: f64,
     /// By how much it rang then, counts.
     rings_counts: f64,
     play: Option<Play>,
@@ -189,7 +168,7 @@ impl Axis {
         Self {
             origin_counts: truth.start_counts,
             setpoint_counts: 0.0,
-            behind_counts: 0.0,
+            settles_counts: 0.0,
             rings_counts: 0.0,
             play: truth.play,
             drive_ahead_counts: 0.0,
@@ -243,8 +222,7 @@ impl Axis {
         if moved == 0.0 {
             return;
         }
-        let lag = self.truth.settle.as_ref().map_or(0.0, |settle| settle.lag_counts_max);
-        self.behind_counts = -moved.clamp(-lag, lag);
+        self.settles_counts = self.truth.settling.map_or(0.0, |settling| settling.after(moved));
         self.rings_counts = self.truth.rings.map_or(0.0, |rings| rings.after(moved));
         self.stopped = now;
         self.setpoint_counts = counts;
@@ -269,11 +247,8 @@ impl Axis {
     fn position(&self, now: Instant) -> f64 {
         let mut position = self.setpoint_counts + self.ahead_counts();
         let since_s = seconds(now.since(self.stopped));
-        if let Some(settle) = &self.truth.settle {
-            let rest = 1.0 - since_s / settle.time_s;
-            if rest > 0.0 {
-                position += self.behind_counts * rest * rest * rest;
-            }
+        if let Some(settling) = &self.truth.settling {
+            position += self.settles_counts * settling.left(since_s);
         }
         if let Some(rings) = &self.truth.rings {
             position += self.rings_counts * rings.left(since_s);
@@ -295,7 +270,7 @@ impl Axis {
 
     /// When the axis will be at rest.
     pub(crate) fn rests_at(&self) -> Instant {
-        let settles_s = self.truth.settle.as_ref().map_or(0.0, |settle| settle.time_s);
+        let settles_s = self.truth.settling.map_or(0.0, |settling| settling.lasts_s());
         let rings_s = self.truth.rings.map_or(0.0, |rings| rings.lasts_s());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds at most
         let micros = libm::ceil(settles_s.max(rings_s) * 1e6) as u64;
@@ -324,7 +299,7 @@ impl Axis {
         };
         self.origin_counts = self.mark_counts;
         self.setpoint_counts = 0.0;
-        self.behind_counts = 0.0;
+        self.settles_counts = 0.0;
         self.rings_counts = 0.0;
         self.homings += 1;
     }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use super::flaws::{
     AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, MISSED_STEPS, MOTION_SMEAR, MissedSteps,
-    NON_ORTHOGONALITY, Ringing, SETTLE_RINGING, WOBBLE,
+    NON_ORTHOGONALITY, Ringing, SETTLE_RINGING, SETTLING, WOBBLE,
 };
 use super::geometry::{Kinematics, Misaligned, Perfect};
 use super::ringing::Rings;
+use super::settling::Settling;
 use super::smear::{self, Moment};
 use super::weigh::{Departing, Joints, Trials};
 use super::{AxisTruth, Misalignment, Uncertain};
@@ -18,8 +19,8 @@ use crate::optics::Axis;
 use crate::simulated::AXIS_NAMES;
 use crate::{Nominal, NominalAxis, Simulated};
 
-/// ADC readings of a dwell that a ringing axis is tried at, at most.
-const RINGING_TRIALS: u32 = 64;
+/// Moments of a dwell that an axis not yet at rest is tried at, at most.
+const UNREST_TRIALS: u32 = 64;
 
 /// ADC readings of a dwell that smear is summed over, at most.
 const SMEAR_READINGS: f64 = 1e5;
@@ -55,7 +56,7 @@ pub(crate) fn axes(
             ("zero", &mut axis.u_zero),
             ("homing", &mut axis.u_homing),
             ("scale", &mut axis.u_readback),
-            ("settling", &mut axis.settle_s),
+            (SETTLING, &mut axis.settle_s),
         ] {
             if !chosen.has(&format!("{name}-{what}")) {
                 *value = 0.0;
@@ -129,7 +130,6 @@ impl Weighing<'_> {
         } else {
             "the setpoint, rounded to a count"
         };
-        let lag = AxisTruth::lag_units_max(axis);
         vec![
             drawn(
                 "zero",
@@ -156,21 +156,14 @@ impl Weighing<'_> {
                 Influence::Mandatory(Some(resolution)),
                 rounded,
             ),
-            Candidate::of_key(
-                format!("{name}-settling"),
-                &format!("axes.{name}.settle_ms = {}", axis.settle_s * 1e3),
-                lag > 0.0,
-                Influence::Sized(Bound { value: lag, unit }),
-                "behind after a stop by what its acceleration asks, (1 - t/settle)³, then exactly \
-                 at rest",
-            ),
+            self.settling(i),
         ]
     }
 
     /// What `[simulated]` states of an axis.
     fn flaws(&self, i: usize) -> Vec<Candidate> {
         let (name, axis) = (AXIS_NAMES[i], &self.setting.nominal.axes[i]);
-        let AxisFlaws { backlash, encoder_error, ringing, missed_steps } =
+        let AxisFlaws { backlash, encoder_error, ringing, missed_steps, .. } =
             self.setting.simulated.axes[i];
         let (_, key, per_key) = units(i);
         let of = |effect: &str, key_name: &str, size: f64, weigh: &dyn Fn() -> Influence, how| {
@@ -224,18 +217,59 @@ impl Weighing<'_> {
         missed.counts * libm::sqrt(mean * (1.0 - p) + mean * mean) / axis.counts_per_unit.abs()
     }
 
-    /// In a dwell that begins when the axis's stated time to settle is over.
-    fn ringing(&self, i: usize, ringing: &Ringing) -> Influence {
-        let axis = &self.setting.nominal.axes[i];
-        let rings = Rings::new(ringing, axis.counts_per_unit);
-        let n = (self.setting.terms.dwell_s * f64::from(axis_rate(self.setting))).max(1.0);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 64
-        let trials = n.min(f64::from(RINGING_TRIALS)) as u32;
-        let at = |k: u32| {
-            let part = (f64::from(k) + 0.5) / f64::from(trials);
-            axis.settle_s + part * self.setting.terms.dwell_s
+    /// Of an axis that comes to rest when its stated time is over nothing is left in a dwell.
+    fn settling(&self, i: usize) -> Candidate {
+        let (name, axis) = (AXIS_NAMES[i], &self.setting.nominal.axes[i]);
+        let (stated_s, takes_s) = (axis.settle_s, self.takes_s(i));
+        let settling = Settling::new(axis, takes_s);
+        let stated = format!("axes.{name}.settle_ms = {}", stated_s * 1e3);
+        let cause = if takes_s > stated_s {
+            format!("simulated.{name}.settle_ms = {}, {stated}", takes_s * 1e3)
+        } else {
+            stated
         };
-        let left: Vec<f64> = (0..trials).map(|k| ringing.amplitude * rings.left(at(k))).collect();
+        let influence = match settling.filter(|_| takes_s > stated_s) {
+            Some(settling) => {
+                let lag = settling.lag_counts() / axis.counts_per_unit.abs();
+                self.unrest(i, &|from_s, to_s| lag * settling.mean_left(from_s, to_s))
+            }
+            None => Influence::Relative(0.0),
+        };
+        let how = "behind after a stop by what its acceleration asks, (1 - t/settle)³, then \
+                   exactly at rest";
+        let name = format!("{name}-{SETTLING}");
+        let mut candidate = Candidate::of_key(name, &cause, settling.is_some(), influence, how);
+        if settling.is_some() {
+            let how_out = if takes_s > stated_s {
+                "the axis is taken to rest at once"
+            } else {
+                "a dwell begins when the stated time is over, and finds the axis at rest (a host \
+                 that waits less will not see that: force it)"
+            };
+            how_out.clone_into(&mut candidate.how_out);
+        }
+        candidate
+    }
+
+    /// How long an axis really takes to come to rest, seconds.
+    fn takes_s(&self, i: usize) -> f64 {
+        self.setting.simulated.axes[i].settle_s.unwrap_or(self.setting.nominal.axes[i].settle_s)
+    }
+
+    fn ringing(&self, i: usize, ringing: &Ringing) -> Influence {
+        let rings = Rings::new(ringing, self.setting.nominal.axes[i].counts_per_unit);
+        self.unrest(i, &|from_s, to_s| ringing.amplitude * rings.left(f64::midpoint(from_s, to_s)))
+    }
+
+    /// In a dwell that begins when the axis's stated time to settle is over. `off`: by how much the
+    /// axis is off between two moments after its stop, units.
+    fn unrest(&self, i: usize, off: &dyn Fn(f64, f64) -> f64) -> Influence {
+        let (axis, dwell_s) = (&self.setting.nominal.axes[i], self.setting.terms.dwell_s);
+        let n = (dwell_s * f64::from(axis_rate(self.setting))).max(1.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 64
+        let trials = n.min(f64::from(UNREST_TRIALS)) as u32;
+        let at = |k: u32| axis.settle_s + dwell_s * f64::from(k) / f64::from(trials);
+        let left: Vec<f64> = (0..trials).map(|k| off(at(k), at(k + 1))).collect();
         let moved = |joints: Joints, sign: f64| -> Vec<Axis> {
             let off = left.iter().map(|by| {
                 let mut joints = joints;
@@ -247,33 +281,25 @@ impl Weighing<'_> {
         self.largest(&[&|joints| moved(joints, 1.0), &|joints| moved(joints, -1.0)])
     }
 
-    /// Of the axes that still ring when their stated time to settle is over.
+    /// Of the axes that are not at rest when their stated time to settle is over.
     fn of_smear(&self) -> Candidate {
-        let Setting { nominal, simulated, terms, .. } = self.setting;
-        let reading_s = 1.0 / f64::from(nominal.detector.adc_rate_hz);
-        let moments = smear::moments(fastest_hz(simulated), reading_s);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
-        let n = (terms.dwell_s / reading_s).clamp(1.0, SMEAR_READINGS) as u32;
         let mut names = Vec::new();
         let mut influence = 0.0;
-        for (i, (axis, flaws)) in nominal.axes.iter().zip(&simulated.axes).enumerate() {
-            let Some(ringing) = flaws.ringing.filter(|ringing| ringing.amplitude > 0.0) else {
-                continue;
-            };
-            let rings = Rings::new(&ringing, axis.counts_per_unit);
-            if rings.lasts_s() <= axis.settle_s {
-                continue;
+        for (i, name) in AXIS_NAMES.into_iter().enumerate() {
+            let smeared = self.smeared(i);
+            if !smeared.is_empty() {
+                names.push(name);
             }
-            names.push(AXIS_NAMES[i]);
-            let change = smear::change(&rings, &moments, axis.settle_s, reading_s, n);
-            if let Influence::Relative(of_axis) = self.off(i, ringing.amplitude * change) {
-                influence += of_axis;
+            for by in smeared {
+                if let Influence::Relative(of_axis) = self.off(i, by) {
+                    influence += of_axis;
+                }
             }
         }
         let key = if names.is_empty() {
-            "dwells are taken at rest, and no axis rings beyond its time to settle".to_owned()
+            "dwells are taken at rest: no axis moves on beyond its time to settle".to_owned()
         } else {
-            format!("{} rings beyond its time to settle", names.join(", "))
+            format!("{} moves on beyond its time to settle", names.join(", "))
         };
         Candidate::of_key(
             MOTION_SMEAR,
@@ -282,6 +308,32 @@ impl Weighing<'_> {
             Influence::Relative(influence),
             "until the axes rest, each ADC reading is the mean over the places passed in its time",
         )
+    }
+
+    /// By how much the mean of a dwell moves when its readings are not taken for their ends, units:
+    /// of an axis that rings, and of one that has not settled.
+    fn smeared(&self, i: usize) -> Vec<f64> {
+        let Setting { nominal, simulated, terms, .. } = self.setting;
+        let (axis, flaws) = (&nominal.axes[i], &simulated.axes[i]);
+        let reading_s = 1.0 / f64::from(nominal.detector.adc_rate_hz);
+        let moments = smear::moments(fastest_hz(simulated), reading_s);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
+        let n = (terms.dwell_s / reading_s).clamp(1.0, SMEAR_READINGS) as u32;
+        let change =
+            |left: &dyn Fn(f64) -> f64| smear::change(left, &moments, axis.settle_s, reading_s, n);
+        let mut smeared = Vec::new();
+        if let Some(ringing) = flaws.ringing.filter(|ringing| ringing.amplitude > 0.0) {
+            let rings = Rings::new(&ringing, axis.counts_per_unit);
+            if rings.lasts_s() > axis.settle_s {
+                smeared.push(ringing.amplitude * change(&|since_s| rings.left(since_s)));
+            }
+        }
+        let settling = Settling::new(axis, self.takes_s(i));
+        if let Some(settling) = settling.filter(|settling| settling.lasts_s() > axis.settle_s) {
+            let lag = settling.lag_counts() / axis.counts_per_unit.abs();
+            smeared.push(lag * change(&|since_s| settling.left(since_s)));
+        }
+        smeared
     }
 
     fn of_misalignment(&self) -> Vec<Candidate> {

@@ -45,6 +45,9 @@ pub struct AxisFlaws {
     pub ringing: Option<Ringing>,
     /// How it loses steps.
     pub missed_steps: Option<MissedSteps>,
+    /// How long it takes to come to rest, seconds, at least 0. `None`: as long as the rig file
+    /// states.
+    pub settle_s: Option<f64>,
 }
 
 /// A sine in the position: the eccentricity of a graduated circle, the pitch of a screw, the
@@ -85,6 +88,8 @@ const FREQUENCY_HZ_MAX: f64 = 1e4;
 /// An oscillation that is damped less outlasts any dwell.
 const DAMPING: (f64, f64) = (1e-4, 0.999);
 const COUNTS_MAX: f64 = 1e6;
+/// As long as a rig file may state.
+const SETTLE_MS_MAX: f64 = 60_000.0;
 
 /// The effects' names, as rows and command lines have them; an axis's begin with its own.
 pub(super) const AXIS_OFFSET: &str = "axis-offset";
@@ -92,6 +97,7 @@ pub(super) const NON_ORTHOGONALITY: &str = "non-orthogonality";
 pub(super) const WOBBLE: &str = "wobble";
 pub(super) const BACKLASH: &str = "backlash";
 pub(super) const ENCODER_ERROR: &str = "encoder-error";
+pub(super) const SETTLING: &str = "settling";
 pub(super) const SETTLE_RINGING: &str = "settle-ringing";
 pub(super) const MISSED_STEPS: &str = "missed-steps";
 pub(super) const MOTION_SMEAR: &str = "motion-smear";
@@ -202,7 +208,9 @@ impl AxisFlaws {
         let error = Bounds::between(0.0, ERROR_MAX);
         let key = |name: &str| format!("{name}_{unit}");
         let backlash = table.number(&key("backlash"), error)?.unwrap_or(0.0) * per_unit;
-        let mut read = Self { backlash, ..Self::default() };
+        let settle_ms = table.number("settle_ms", Bounds::between(0.0, SETTLE_MS_MAX))?;
+        let settle_s = settle_ms.map(|ms| ms / 1e3);
+        let mut read = Self { backlash, settle_s, ..Self::default() };
         if let Some(error_table) = table.table("encoder_error")? {
             let period = Bounds::positive_up_to(PERIOD_MAX);
             read.encoder_error = Some(EncoderError {
@@ -244,6 +252,7 @@ impl AxisFlaws {
         self.encoder_error = self.encoder_error.filter(|_| is_in(ENCODER_ERROR));
         self.ringing = self.ringing.filter(|_| is_in(SETTLE_RINGING));
         self.missed_steps = self.missed_steps.filter(|_| is_in(MISSED_STEPS));
+        self.settle_s = self.settle_s.filter(|_| is_in(SETTLING));
         self
     }
 }

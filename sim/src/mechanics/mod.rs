@@ -12,6 +12,7 @@ mod geometry;
 mod play;
 mod ringing;
 mod scale;
+mod settling;
 mod smear;
 mod weigh;
 

@@ -1,8 +1,7 @@
 //! Motion smear: an ADC reading averages over the places that the axes pass in its time.
 //!
-//! The device takes its readings at rest, so that only an axis that still rings smears.
-
-use super::ringing::Rings;
+//! The device takes its readings at rest, so that only an axis that still rings, or takes longer to
+//! settle than is stated, smears.
 
 /// A moment of an ADC reading: how long before its end, as a part of it, and its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,10 +37,11 @@ pub(super) fn moments(fastest_hz: f64, reading_s: f64) -> Vec<Moment> {
     (0..panels).flat_map(of_panel).collect()
 }
 
-/// By how much the mean of a dwell that begins so long after a stop changes, of an oscillation
-/// that began with one, when its readings average instead of standing for their ends.
+/// By how much the mean of a dwell that begins so long after a stop changes, of a departure of
+/// which `left` is what remains at a time, when its readings average instead of standing for their
+/// ends.
 pub(super) fn change(
-    rings: &Rings,
+    left: &dyn Fn(f64) -> f64,
     moments: &[Moment],
     begin_s: f64,
     reading_s: f64,
@@ -50,9 +50,9 @@ pub(super) fn change(
     let of_reading = |k: u32| {
         let end_s = begin_s + f64::from(k) * reading_s;
         let at = |moment: &Moment| {
-            moment.weight * rings.left((end_s - moment.before_end * reading_s).max(0.0))
+            moment.weight * left((end_s - moment.before_end * reading_s).max(0.0))
         };
-        moments.iter().map(at).sum::<f64>() - rings.left(end_s)
+        moments.iter().map(at).sum::<f64>() - left(end_s)
     };
     (1..=n).map(of_reading).sum::<f64>().abs() / f64::from(n)
 }
@@ -61,6 +61,7 @@ pub(super) fn change(
 mod tests {
     use core::f64::consts::TAU;
 
+    use super::super::ringing::Rings;
     use super::*;
     use crate::mechanics::Ringing;
 
@@ -84,7 +85,7 @@ mod tests {
     fn over_a_dwell_the_changes_of_its_readings_leave_half_of_its_ends() {
         let ringing = Ringing { amplitude: 1.0, frequency_hz: 20.0, damping_ratio: 0.05 };
         let rings = Rings::new(&ringing, 1e6);
-        let found = change(&rings, &moments(20.0, 5e-4), 0.0, 5e-4, 100);
+        let found = change(&|since_s| rings.left(since_s), &moments(20.0, 5e-4), 0.0, 5e-4, 100);
         // The sum over ends is the integral and half the difference of the ends (Euler, Maclaurin).
         let expected = (rings.left(0.0) - rings.left(0.05)) / 200.0;
         assert!((found / expected - 1.0).abs() < 0.05, "{found} beside {expected}");

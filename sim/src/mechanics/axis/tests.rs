@@ -3,8 +3,13 @@
 use super::*;
 use crate::mechanics::flaws::{EncoderError, MissedSteps, Ringing};
 
-const NONE: AxisFlaws =
-    AxisFlaws { backlash: 0.0, encoder_error: None, ringing: None, missed_steps: None };
+const NONE: AxisFlaws = AxisFlaws {
+    backlash: 0.0,
+    encoder_error: None,
+    ringing: None,
+    missed_steps: None,
+    settle_s: None,
+};
 
 fn axis() -> NominalAxis {
     NominalAxis {

@@ -41,7 +41,7 @@ pub(super) enum Measure {
 
 pub(super) type Draw = fn(&mut Dice) -> Case;
 
-pub(super) const EFFECTS: [Draw; 27] = [
+pub(super) const EFFECTS: [Draw; 28] = [
     stray_light,
     dark_current,
     dark_drift,
@@ -61,6 +61,7 @@ pub(super) const EFFECTS: [Draw; 27] = [
     phi_zero,
     backlash,
     encoder_error,
+    settling,
     ringing,
     missed_steps,
     non_orthogonality,
@@ -309,6 +310,14 @@ fn ringing(dice: &mut Dice) -> Case {
         frequency_hz: dice.decades(0.5, 2.0),
         damping_ratio: dice.decades(-2.0, -0.3),
     });
+    case
+}
+
+/// Longer than the rig file states, which is nothing.
+fn settling(dice: &mut Dice) -> Case {
+    let mut case = of_lobe("theta-settling", dice, Measure::Sides);
+    // The axis's acceleration makes that a lag of 1e-7 to 0.2 rad.
+    theta_flaws(&mut case).settle_s = Some(dice.decades(-3.0, -0.3));
     case
 }
 
