@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::drawn::Drawn;
 use crate::effect::{Chosen, EffectRow};
 use crate::field::{Field, Ray};
+use crate::light::Scenery;
 use crate::optics::{Axis, FINITE_BEAM, Optics, PointSampled};
 use crate::stage::Stages;
 use crate::{Nominal, Region, Scene, Simulated, Truth, detector, light, time};
@@ -23,6 +24,7 @@ pub struct Compiled {
     pub(super) field: Arc<dyn Field>,
     /// The names of the effects of light: without one of them, something else is seen.
     pub(super) light: Vec<String>,
+    pub(super) scenery: Scenery,
     pub(crate) optics: Arc<dyn Optics>,
     pub(crate) chosen: Chosen,
     pub(super) region: Region,
@@ -45,8 +47,8 @@ impl Compiled {
         if self.light.iter().any(|name| name == effect) {
             let is_in = |name: &str| less.chosen.has(name);
             let distance_m = Some(self.nominal.detector.distance_m);
-            less.seen = light::field(&self.scene, distance_m, &is_in).ok()?;
-            less.field = light::field(&self.scene, None, &is_in).ok()?;
+            less.seen = light::field(&self.scenery, distance_m, &is_in).ok()?;
+            less.field = light::field(&self.scenery, None, &is_in).ok()?;
             less.optics = self.optics.looking_at(Arc::clone(&less.seen));
         }
         if !less.chosen.has(FINITE_BEAM) {

@@ -11,6 +11,7 @@ mod drawn;
 mod error;
 mod setting;
 
+use core::f64::consts::PI;
 use std::sync::Arc;
 
 pub use compiled::Compiled;
@@ -20,6 +21,7 @@ pub(crate) use setting::{PART_OF_NOISE, Setting};
 
 use crate::check::check;
 use crate::effect::decide;
+use crate::light::Scenery;
 use crate::optics::Light;
 use crate::{Nominal, Scene, Simulated, Terms, detector, light, mechanics, time};
 use drawn::Drawn;
@@ -33,7 +35,13 @@ pub fn compile(
 ) -> Result<Compiled, CompileError> {
     check(&scene, &nominal, &simulated, terms)?;
     let scene = Arc::new(scene);
-    let mut setting = Setting::new(&scene, &nominal, &simulated, terms)?;
+    let mut scenery = Scenery::new(Arc::clone(&scene))?;
+    if scenery.sees_itself() {
+        let tolerance = Setting::new(&scenery, &nominal, &simulated, terms)?.tolerance;
+        let spot_radius_m = nominal.detector.spot_radius_m;
+        scenery = scenery.with_exchange(tolerance, PI * spot_radius_m * spot_radius_m)?;
+    }
+    let mut setting = Setting::new(&scenery, &nominal, &simulated, terms)?;
     let tolerance = setting.tolerance;
     let mut beam = Light::of(&setting).map_err(CompileError::Beam)?;
     let mut candidates = core::mem::take(&mut beam.candidates);
@@ -47,10 +55,10 @@ pub fn compile(
     candidates.extend(detector::candidates(&setting));
     let chosen = decide(candidates, tolerance, terms)?;
     let is_in = |name: &str| chosen.has(name);
-    setting.field = light::field(&scene, Some(nominal.detector.distance_m), &is_in)?;
+    setting.field = light::field(&scenery, Some(nominal.detector.distance_m), &is_in)?;
     let is_whole = called.iter().all(|name| chosen.has(name));
     let (region, optics) = (setting.region, beam.optics(&setting, &chosen, is_whole));
-    let (seen, field) = (Arc::clone(&setting.field), light::field(&scene, None, &is_in)?);
+    let (seen, field) = (Arc::clone(&setting.field), light::field(&scenery, None, &is_in)?);
     let (seed, drawn) = (terms.seed, Drawn::new(&nominal, &simulated, terms.seed, &chosen)?);
     Ok(Compiled {
         scene,
@@ -61,6 +69,7 @@ pub fn compile(
         seen,
         field,
         light,
+        scenery,
         optics,
         chosen,
         region,

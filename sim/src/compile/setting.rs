@@ -8,7 +8,7 @@ use radiometry::throughput::coaxial_disks;
 use super::CompileError;
 use crate::detector::ELEMENTARY_CHARGE_C;
 use crate::field::Field;
-use crate::light;
+use crate::light::{self, Scenery};
 use crate::{Nominal, Region, Scene, Simulated, Terms};
 
 /// What every candidate is weighed by. Nothing in it is drawn: what a rig is compiled to does not
@@ -16,6 +16,7 @@ use crate::{Nominal, Region, Scene, Simulated, Terms};
 #[derive(Debug)]
 pub(crate) struct Setting<'s> {
     pub(crate) scene: &'s Scene,
+    pub(crate) scenery: &'s Scenery,
     pub(crate) nominal: &'s Nominal,
     pub(crate) simulated: &'s Simulated,
     pub(crate) terms: &'s Terms,
@@ -38,7 +39,7 @@ pub(crate) const PART_OF_NOISE: f64 = 0.1;
 
 impl<'s> Setting<'s> {
     pub(super) fn new(
-        scene: &'s Arc<Scene>,
+        scenery: &'s Scenery,
         nominal: &'s Nominal,
         simulated: &'s Simulated,
         terms: &'s Terms,
@@ -47,10 +48,12 @@ impl<'s> Setting<'s> {
         let throughput =
             coaxial_disks(detector.pupil_radius_m, detector.spot_radius_m, detector.distance_m)
                 .map_err(|_| CompileError::Drawn("throughput", detector.distance_m))?;
+        let scene = &*scenery.scene;
         let region = terms.region.unwrap_or_else(|| scene.bounding_region());
-        let field = light::field(scene, Some(detector.distance_m), &|_| true)?;
+        let field = light::field(scenery, Some(detector.distance_m), &|_| true)?;
         let mut setting = Self {
             scene,
+            scenery,
             nominal,
             simulated,
             terms,

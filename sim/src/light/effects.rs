@@ -4,7 +4,8 @@
 
 use std::sync::Arc;
 
-use super::{Included, LitScene, landmarks, plain};
+use super::interreflection::facing;
+use super::{INTERREFLECTION, Included, LitScene, Scenery, landmarks, plain};
 use crate::compile::Setting;
 use crate::effect::{Candidate, Influence};
 use crate::field::Field;
@@ -16,15 +17,14 @@ const MARGIN: f64 = 1.25;
 
 /// What is seen of a scene: from a distance, or (without one) what leaves the sample.
 pub(crate) fn field(
-    scene: &Arc<Scene>,
+    scenery: &Scenery,
     distance_m: Option<f64>,
     is_in: Included<'_>,
 ) -> Result<Arc<dyn Field>, CompileError> {
-    if let Some(plain) = plain(scene) {
+    if let Some(plain) = plain(&scenery.scene) {
         return Ok(plain);
     }
-    refuse(scene)?;
-    Ok(Arc::new(LitScene::new(scene, distance_m, is_in)?))
+    Ok(Arc::new(LitScene::new(scenery, distance_m, is_in)?))
 }
 
 /// One for each lamp, occluder and window. None for a scene of flat emitters.
@@ -34,7 +34,7 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         return Ok(Vec::new());
     }
     let distance_m = Some(setting.nominal.detector.distance_m);
-    let whole = LitScene::new(scene, distance_m, &|_| true)?;
+    let whole = LitScene::new(setting.scenery, distance_m, &|_| true)?;
     let weighing = Weighing { setting, distance_m, whole: &whole };
     let mut found = Vec::new();
     for (i, lamp) in scene.lamps().iter().enumerate() {
@@ -58,6 +58,7 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         let how = "black where a ray meets it before the detector";
         found.push(weighing.candidate(format!("beam-shadow[{i}]"), cause, how)?);
     }
+    found.extend(weighing.interreflection()?);
     for (i, window) in scene.windows().iter().enumerate() {
         let owner = match window.belongs_to {
             WindowOwner::Beam => "beam",
@@ -113,10 +114,31 @@ impl Weighing<'_> {
         })
     }
 
+    /// Of scenes with two surfaces or more.
+    fn interreflection(&self) -> Result<Option<Candidate>, CompileError> {
+        if self.setting.scene.surfaces().len() < 2 {
+            return Ok(None);
+        }
+        let exchange = self.setting.scenery.exchange.as_ref();
+        let pairs = exchange.map(|exchange| exchange.pairs()).unwrap_or_default();
+        let cause = pairs.first().map(|first| {
+            let others = if pairs.len() > 2 { ", and others" } else { "" };
+            format!(
+                "surface[{}] and surface[{}] see each other, F = {:.2e}{others}",
+                first.from, first.to, first.form_factor
+            )
+        });
+        let how =
+            "radiosity, solved once on cells as fine as the light asks for; a polynomial on each";
+        let mut candidate = self.candidate(INTERREFLECTION.to_owned(), cause, how)?;
+        candidate.error = exchange.map(|exchange| exchange.error);
+        Ok(Some(candidate))
+    }
+
     /// The largest |with - without| / max(with, without, noise floor) over the region's rays.
     fn influence(&self, name: &str) -> Result<f64, CompileError> {
-        let (scene, region) = (self.setting.scene, &self.setting.region);
-        let without = LitScene::new(scene, self.distance_m, &|other| other != name)?;
+        let (scenery, region) = (self.setting.scenery, &self.setting.region);
+        let without = LitScene::new(scenery, self.distance_m, &|other| other != name)?;
         let largest = self.whole.landmarks(region).iter().fold(0.0, |largest: f64, ray| {
             let (a, b) = (self.whole.radiance(ray), without.radiance(ray));
             let scale = a.max(b).max(self.setting.floor);
@@ -209,19 +231,19 @@ pub(super) fn returning(scene: &Scene) -> Result<Option<(usize, &Window)>, Compi
 }
 
 /// What is not simulated, by name.
-fn refuse(scene: &Scene) -> Result<(), CompileError> {
+pub(super) fn refuse(scene: &Scene) -> Result<(), CompileError> {
     for (i, surface) in scene.surfaces().iter().enumerate() {
         if !surface.reflection().is_lambertian() {
             return Err(CompileError::Unsupported(format!("surface[{i}].kind = \"glossy\"")));
         }
-        for (k, other) in scene.surfaces().iter().enumerate().skip(i + 1) {
-            let reflects = surface.reflection().albedo > 0.0 && other.reflection().albedo > 0.0;
-            if reflects && surface.body().faces(other.body()) {
-                return Err(CompileError::Unsupported(format!(
-                    "surface[{i}] and surface[{k}] see each other: light that goes between them"
-                )));
-            }
-        }
+    }
+    let pairs = facing(scene);
+    let glass = scene.windows().iter().position(|w| w.belongs_to == WindowOwner::Sample);
+    if let (Some((i, k)), Some(glass)) = (pairs.first(), glass) {
+        return Err(CompileError::Unsupported(format!(
+            "surface[{i}] and surface[{k}] see each other, light that goes between them, with \
+             window[{glass}] of the sample"
+        )));
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use radiometry::{EstimateError, Tolerance};
 use super::plate::Plate;
 use super::{Included, occluder_of};
 use crate::CompileError;
-use crate::scene::{Body, LampSource, Law, Scene, Shape, Solid, WindowOwner};
+use crate::scene::{Body, Emitter, LampSource, Law, Scene, Shape, Solid, Surface, WindowOwner};
 
 /// How far away a distant lamp is put: farther than any body of a scene. It stands at the same place
 /// seen from everywhere, so that the distance has no other meaning.
@@ -33,6 +33,8 @@ pub(super) struct Source {
     kind: SourceKind,
     /// Its place among the opaque bodies, if it is one.
     own: Option<usize>,
+    /// Of an emitter: what it is, of which one side shines.
+    emitter: Option<Body>,
 }
 
 #[derive(Debug)]
@@ -71,10 +73,7 @@ pub(super) struct Shade {
 }
 
 /// Everything that shines on surfaces: lamps, and emitters above the plane.
-pub(super) fn sources(
-    scene: &Scene,
-    is_in: Included<'_>,
-) -> Result<Vec<Arc<Source>>, CompileError> {
+fn sources(scene: &Scene, is_in: Included<'_>) -> Result<Vec<Arc<Source>>, CompileError> {
     let mut sources = Vec::new();
     for (i, lamp) in scene.lamps().iter().enumerate() {
         let name = format!("lamp[{i}]");
@@ -103,40 +102,51 @@ pub(super) fn sources(
             }
         };
         let own = lamp.solid().and_then(|solid| position(scene, solid));
-        sources.push(Arc::new(Source { name, radiance: lamp.radiance(), kind, own }));
+        sources.push(Arc::new(Source {
+            name,
+            radiance: lamp.radiance(),
+            kind,
+            own,
+            emitter: None,
+        }));
     }
     for (i, emitter) in scene.emitters().iter().enumerate() {
-        let Body::Raised(solid) = emitter.body() else { continue };
-        if scene.surfaces().is_empty() || emitter.level() == 0.0 {
-            continue;
-        }
-        let name = format!("emitter[{i}]");
-        if *emitter.law() != Law::Lambertian {
-            return Err(CompileError::Unsupported(format!(
-                "light of {name} on surfaces: it is raised and not lambertian"
-            )));
-        }
-        refuse_under_glass(scene, &name, solid.heights_m().1)?;
-        let front = match solid {
-            Solid::Sphere(_) | Solid::HalfPlane(_) => None,
-            Solid::Disk(_) | Solid::Polygon(_) => {
-                let (point, normal) = solid.plane();
-                Some((point, normal))
-            }
-        };
-        let kind = SourceKind::Body(shining(solid, &name)?, front);
-        let own = position(scene, solid);
-        sources.push(Arc::new(Source { name, radiance: emitter.level(), kind, own }));
+        sources.extend(emitting(scene, i, emitter)?.map(Arc::new));
     }
     Ok(sources)
 }
 
+/// An emitter, as far as a surface lies before it.
+fn emitting(scene: &Scene, i: usize, emitter: &Emitter) -> Result<Option<Source>, CompileError> {
+    let is_before = |surface: &Surface| emitter.body().faces(surface.body());
+    let solid = emitter.body().solid().filter(|_| scene.surfaces().iter().any(is_before));
+    let Some(solid) = solid.filter(|_| emitter.level() > 0.0) else { return Ok(None) };
+    let name = format!("emitter[{i}]");
+    if *emitter.law() != Law::Lambertian || emitter.texture().is_some() {
+        return Err(CompileError::Unsupported(format!(
+            "light of {name} on surfaces: it is not lambertian and the same everywhere"
+        )));
+    }
+    refuse_under_glass(scene, &name, solid.heights_m().1)?;
+    let front = match solid {
+        Solid::Sphere(_) | Solid::HalfPlane(_) => None,
+        Solid::Disk(_) | Solid::Polygon(_) => {
+            let (point, _) = solid.plane();
+            Some((point, emitter.body().normal(point)))
+        }
+    };
+    let kind = SourceKind::Body(shining(&solid, &name)?, front);
+    let own = position(scene, &solid);
+    let body = emitter.body().clone();
+    Ok(Some(Source { name, radiance: emitter.level(), kind, own, emitter: Some(body) }))
+}
+
 /// Among the opaque bodies above the plane.
-fn position(scene: &Scene, solid: &Solid) -> Option<usize> {
+pub(super) fn position(scene: &Scene, solid: &Solid) -> Option<usize> {
     scene.opaque().iter().position(|(_, other)| other == solid)
 }
 
-fn shining(solid: &Solid, name: &str) -> Result<Shining, CompileError> {
+pub(super) fn shining(solid: &Solid, name: &str) -> Result<Shining, CompileError> {
     match solid {
         Solid::Disk(disk) => Ok(Shining::Disk(*disk)),
         Solid::Polygon(polygon) => Ok(Shining::Polygon(polygon.clone())),
@@ -192,8 +202,15 @@ fn through_windows(
 }
 
 impl Lighting {
+    /// Of all surfaces of a scene.
+    pub(super) fn all(scene: &Scene, is_in: Included<'_>) -> Result<Vec<Arc<Self>>, CompileError> {
+        let sources = sources(scene, is_in)?;
+        let of = |i| Self::new(scene, i, &sources, is_in).map(Arc::new);
+        (0..scene.surfaces().len()).map(of).collect()
+    }
+
     /// What shines on surface `i`, with the bodies that can stand before each source.
-    pub(super) fn new(
+    fn new(
         scene: &Scene,
         i: usize,
         sources: &[Arc<Source>],
@@ -206,7 +223,10 @@ impl Lighting {
         };
         let region = region_of(surface.body());
         let mut by = Vec::new();
-        for source in sources {
+        let reaches = |source: &&Arc<Source>| {
+            source.emitter.as_ref().is_none_or(|emitter| emitter.faces(surface.body()))
+        };
+        for source in sources.iter().filter(reaches) {
             let (mut before, mut names) = (Vec::new(), Vec::new());
             let mut umbra_of = None;
             for (k, (name, solid)) in scene.opaque().iter().enumerate() {
@@ -257,7 +277,7 @@ impl Lighting {
 }
 
 /// The region that a surface fills, where it is flat.
-fn region_of(body: &Body) -> Option<projected::Region> {
+pub(super) fn region_of(body: &Body) -> Option<projected::Region> {
     let flat = |corners: &[(f64, f64)]| {
         Polygon::new(corners.iter().map(|(x, y)| DVec3::new(*x, *y, 0.0)).collect()).ok()
     };

@@ -7,7 +7,7 @@ use radiometry::projected;
 use radiometry::shape::Polygon;
 
 use super::lamps::Shade;
-use super::{Glow, LitScene};
+use super::{Glow, Lit, LitScene};
 use crate::Region;
 use crate::field::{Field, Ray, grid};
 use crate::scene::Body;
@@ -20,7 +20,7 @@ const STEPS: u32 = 16;
 pub(super) fn of(lit: &LitScene, region: &Region) -> Vec<Ray> {
     let mut rays = if lit.is_even() { Vec::new() } else { grid(region) };
     rays.extend(towards_bodies(lit, region));
-    if lit.flat.iter().any(|part| matches!(part.glow, Glow::Lit(..))) {
+    if lit.flat.iter().any(|part| matches!(part.glow, Glow::Lit(_))) {
         let at =
             |(low, high): (f64, f64), i: u32| low + (high - low) * f64::from(i) / f64::from(STEPS);
         for i in 0..=STEPS {
@@ -33,6 +33,10 @@ pub(super) fn of(lit: &LitScene, region: &Region) -> Vec<Ray> {
             rays.push(Ray::new(x, y, 0.0, 0.0));
             rays.extend(cell.corners().map(|(x, y)| Ray::new(x, y, 0.0, 0.0)));
         }
+    }
+    if let Some(interreflection) = &lit.interreflection {
+        let places = interreflection.places();
+        rays.extend(places.into_iter().flat_map(|place| towards(place, region)));
     }
     rays
 }
@@ -61,7 +65,7 @@ impl ShadedCell {
 pub(super) fn shaded(lit: &LitScene, region: &Region) -> Vec<ShadedCell> {
     let mut found = Vec::new();
     for part in &lit.flat {
-        let (Glow::Lit(_, lighting), Some(shape)) = (&part.glow, part.body.shape()) else {
+        let (Glow::Lit(Lit { lighting, .. }), Some(shape)) = (&part.glow, part.body.shape()) else {
             continue;
         };
         let (x, y) = shape.bounding_box();
@@ -99,16 +103,24 @@ fn towards_bodies(lit: &LitScene, region: &Region) -> Vec<Ray> {
     for part in &lit.raised {
         let Body::Raised(solid) = &part.body else { continue };
         for target in solid.points() {
-            for (x, y) in corners_and_middle(region) {
-                let apart = target - DVec3::new(x, y, 0.0);
-                let (theta, phi) = angles(apart);
-                if apart.length() > 0.0 && theta <= region.theta_max_rad {
-                    rays.push(Ray::new(x, y, theta, phi));
-                }
-            }
+            rays.extend(towards(target, region));
         }
     }
     rays
+}
+
+/// A place as it is seen over the region's corners and middle; one on the plane from above.
+fn towards(target: DVec3, region: &Region) -> Vec<Ray> {
+    let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+    if target.z == 0.0 {
+        let is_inside = within(region.x_m, target.x) && within(region.y_m, target.y);
+        return is_inside.then(|| Ray::new(target.x, target.y, 0.0, 0.0)).into_iter().collect();
+    }
+    let over = corners_and_middle(region).into_iter().filter_map(|(x, y)| {
+        let (theta, phi) = angles(target - DVec3::new(x, y, 0.0));
+        (theta <= region.theta_max_rad).then(|| Ray::new(x, y, theta, phi))
+    });
+    over.collect()
 }
 
 fn corners_and_middle(region: &Region) -> [(f64, f64); 5] {

@@ -3,11 +3,13 @@
 //! how far away that stands.
 
 mod effects;
+mod interreflection;
 mod lamps;
 mod landmarks;
 mod patches;
 mod plate;
 mod returned;
+mod scenery;
 
 use std::sync::Arc;
 
@@ -17,13 +19,18 @@ use glam::DVec3;
 use radiometry::projected::Occluder;
 
 pub(crate) use effects::{candidates, field};
+pub(crate) use scenery::Scenery;
 
 use crate::field::{Field, Ray};
 use crate::scene::{Body, Emitter, Law, Reflection, Scene, Solid, WindowOwner};
 use crate::{CompileError, Region};
+use interreflection::Interreflection;
 use lamps::Lighting;
 use plate::Plate;
 use returned::{Patch, Returned};
+
+/// The name of the effect that surfaces light each other.
+const INTERREFLECTION: &str = "interreflection";
 
 /// Which of a scene's effects are in, by their names.
 pub(crate) type Included<'i> = &'i dyn Fn(&str) -> bool;
@@ -38,6 +45,8 @@ pub(crate) struct LitScene {
     plates: Vec<Plate>,
     /// What the sample's window throws back on its plane.
     returned: Option<Returned>,
+    /// What surfaces that see each other send to one another.
+    interreflection: Option<Interreflection>,
     /// How far the detector is from the sample's plane, along its beam; nothing farther is in its
     /// way. Infinite for what leaves the sample.
     reach_m: f64,
@@ -58,25 +67,34 @@ enum Glow {
     Emits(Emitter),
     /// The same everywhere, from both faces.
     Lamp(f64),
-    Lit(Reflection, Lighting),
+    Lit(Lit),
+}
+
+/// A surface: its place in the scene, how it reflects, and what shines on it.
+#[derive(Debug)]
+struct Lit {
+    surface: usize,
+    reflection: Reflection,
+    lighting: Arc<Lighting>,
 }
 
 impl LitScene {
     /// What the detector sees at a distance, or (without one) what leaves the sample.
     pub(crate) fn new(
-        scene: &Scene,
+        scenery: &Scenery,
         distance_m: Option<f64>,
         is_in: Included<'_>,
     ) -> Result<Self, CompileError> {
+        let scene = &*scenery.scene;
         let mut parts = Vec::new();
         for (i, emitter) in scene.emitters().iter().enumerate() {
             let (name, body) = (format!("emitter[{i}]"), emitter.body().clone());
             parts.push(Part { name, body, glow: Glow::Emits(emitter.clone()) });
         }
-        let sources = lamps::sources(scene, is_in)?;
+        let lightings = Lighting::all(scene, is_in)?;
         for (i, surface) in scene.surfaces().iter().enumerate() {
-            let lighting = Lighting::new(scene, i, &sources, is_in)?;
-            let glow = Glow::Lit(*surface.reflection(), lighting);
+            let lighting = Arc::clone(&lightings[i]);
+            let glow = Glow::Lit(Lit { surface: i, reflection: *surface.reflection(), lighting });
             parts.push(Part { name: format!("surface[{i}]"), body: surface.body().clone(), glow });
         }
         if distance_m.is_some() {
@@ -98,7 +116,9 @@ impl LitScene {
         });
         let mut plates = plates.collect::<Result<Vec<_>, _>>()?;
         plates.sort_by(|a, b| b.low_m().total_cmp(&a.low_m()));
-        let mut lit = Self { flat, raised, plates, returned: None, reach_m };
+        let exchange = scenery.exchange.as_ref().filter(|_| is_in(INTERREFLECTION));
+        let interreflection = exchange.map(|exchange| exchange.lit(&lightings)).transpose()?;
+        let mut lit = Self { flat, raised, plates, returned: None, interreflection, reach_m };
         lit.returned = lit.thrown_back(scene, is_in)?;
         Ok(lit)
     }
@@ -117,7 +137,7 @@ impl LitScene {
         let plate = plate.map_err(|e| CompileError::Scene(format!("window[{i}]: {e}")))?;
         let patches = self.flat.iter().filter_map(|part| match &part.glow {
             Glow::Emits(emitter) => Some(Patch::Emits(emitter)),
-            Glow::Lit(reflection, lighting) => {
+            Glow::Lit(Lit { reflection, lighting, .. }) => {
                 let shape = part.body.shape()?;
                 Some(Patch::Lit { shape, albedo: reflection.albedo, lighting })
             }
@@ -135,14 +155,39 @@ impl LitScene {
             Some((solid.last_hit(ray.point, ray.direction, (from, to))?, part))
         });
         let (distance, part) = hits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(part.radiance(ray.point + ray.direction * distance, ray.direction, None))
+        Some(self.radiance_of(part, ray.point + ray.direction * distance, ray.direction))
     }
 
     fn flat_at(&self, ray: &Ray) -> f64 {
         let part = self.flat.iter().find(|part| {
             part.body.shape().is_some_and(|shape| shape.contains(ray.point.x, ray.point.y))
         });
-        part.map_or(0.0, |part| part.radiance(ray.point, ray.direction, self.returned.as_ref()))
+        part.map_or(0.0, |part| self.radiance_of(part, ray.point, ray.direction))
+    }
+
+    /// From a place of a part into a direction.
+    fn radiance_of(&self, part: &Part, place: DVec3, direction: DVec3) -> f64 {
+        match &part.glow {
+            Glow::Black => 0.0,
+            Glow::Emits(emitter) => emitter.radiance_from(place, direction),
+            Glow::Lamp(radiance) => *radiance,
+            Glow::Lit(lit) => {
+                let normal = part.body.normal(place);
+                if normal.dot(direction) <= 0.0 {
+                    return 0.0;
+                }
+                let mut arriving = lit.lighting.irradiance(place, normal);
+                if let Some(returned) =
+                    self.returned.as_ref().filter(|_| part.body.shape().is_some())
+                {
+                    arriving += returned.irradiance(place.truncate());
+                }
+                if let Some(others) = &self.interreflection {
+                    arriving += others.irradiance(lit.surface, place);
+                }
+                lit.reflection.albedo / PI * arriving
+            }
+        }
     }
 }
 
@@ -160,24 +205,6 @@ fn in_the_beam(scene: &Scene, is_in: Included<'_>, parts: &mut Vec<Part>) {
         };
         let (name, body) = (format!("lamp[{i}]"), Body::Raised(solid.clone()));
         parts.push(Part { name, body, glow: Glow::Lamp(lamp.radiance()) });
-    }
-}
-
-impl Part {
-    fn radiance(&self, place: DVec3, direction: DVec3, returned: Option<&Returned>) -> f64 {
-        match &self.glow {
-            Glow::Black => 0.0,
-            Glow::Emits(emitter) => emitter.radiance_from(place, direction),
-            Glow::Lamp(radiance) => *radiance,
-            Glow::Lit(reflection, lighting) => {
-                let normal = self.body.normal(place);
-                if normal.dot(direction) <= 0.0 {
-                    return 0.0;
-                }
-                let back = returned.map_or(0.0, |returned| returned.irradiance(place.truncate()));
-                reflection.albedo / PI * (lighting.irradiance(place, normal) + back)
-            }
-        }
     }
 }
 
@@ -217,7 +244,7 @@ impl Field for LitScene {
     fn is_even(&self) -> bool {
         let is_even = |part: &Part| match &part.glow {
             Glow::Emits(emitter) => *emitter.law() == Law::Lambertian,
-            Glow::Lit(reflection, _) => reflection.is_lambertian(),
+            Glow::Lit(lit) => lit.reflection.is_lambertian(),
             Glow::Black | Glow::Lamp(_) => true,
         };
         self.plates.is_empty() && self.raised.is_empty() && self.flat.iter().all(is_even)

@@ -16,7 +16,7 @@ impl LitScene {
     /// Along a ray from one of them, as if it had no end.
     pub(super) fn of_flat_patch(&self, patch: usize, ray: &Ray) -> f64 {
         let part = self.flat.get(patch);
-        part.map_or(0.0, |part| part.radiance(ray.point, ray.direction, self.returned.as_ref()))
+        part.map_or(0.0, |part| self.radiance_of(part, ray.point, ray.direction))
     }
 }
 
@@ -26,8 +26,8 @@ fn patch(i: usize, part: &Part) -> Option<Patch> {
         Glow::Emits(emitter) => {
             Patch::of_emitter(i, emitter).map(|own| Patch { name: part.name.clone(), ..own })
         }
-        Glow::Lit(reflection, _) => {
-            let is_lambertian = reflection.is_lambertian();
+        Glow::Lit(lit) => {
+            let is_lambertian = lit.reflection.is_lambertian();
             let goes = if is_lambertian { Goes::WithPlace } else { Goes::WithBoth };
             Some(Patch::new(part.name.clone(), part.body.shape()?, goes))
         }

@@ -3,6 +3,7 @@
 
 use core::f64::consts::PI;
 
+use glam::DVec3;
 use sim::{Axis, NominalDetector};
 
 use crate::dice::Dice;
@@ -107,11 +108,15 @@ fn sample(
 
 /// The radiance along the axis alone, a tenth of a millimetre above its spot.
 pub(crate) fn along_axis(world: &World, axis: &Axis, paths: u32, seed: u64) -> Mean {
+    along(world, axis.spot + axis.direction * 1e-4, -axis.direction, paths, seed)
+}
+
+/// What arrives at a point against a direction.
+pub(crate) fn along(world: &World, from: DVec3, into: DVec3, paths: u32, seed: u64) -> Mean {
     let mut dice = Dice(seed);
     let mut sums = Sums::default();
-    let above = axis.spot + axis.direction * 1e-4;
     for _ in 0..paths {
-        sums.add(world.look(above, -axis.direction, &mut dice), 1.0);
+        sums.add(world.look(from, into, &mut dice), 1.0);
     }
     sums.mean()
 }

@@ -58,6 +58,61 @@ fn a_lambertian_panel_is_as_bright_as_every_lamp_makes_it() {
     }
 }
 
+const FLOOR: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-12, 50]\n\
+                     y_mm = [-40, 40]\n";
+
+/// A wall on the floor's edge, which a lamp lights from the front; an emitter behind, on the floor.
+const WALL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.9\n\
+                    corners_mm = [[-12, -40, 0], [-12, 40, 0], [-12, 40, 50], [-12, -40, 50]]\n";
+
+#[test]
+fn a_wall_and_a_floor_light_each_other() {
+    let lamp = "[[lamp]]\nkind = \"sphere\"\ncentre_mm = [120, 20, 60]\nradius_mm = 30\n\
+                radiance_w_per_m2_sr = 10\n";
+    let panel = "[[emitter]]\nkind = \"lambertian\"\nradiance_w_per_m2_sr = 2\n\
+                 x_mm = [52, 80]\ny_mm = [-40, 40]\n";
+    let both = Both::new(read(&format!("{FLOOR}{WALL}{lamp}{panel}")), &[], exact_rig());
+    let row = both.compiled.effects().iter().find(|row| row.name == "interreflection").unwrap();
+    assert!(
+        row.included && row.cause.as_ref().unwrap().contains("see each other, F = "),
+        "{row:?}"
+    );
+    let stated = row.error.unwrap();
+    assert!(stated < 1e-2, "{row:?}");
+    let poses = [(0.0, 0.0, 0.0, 0.0), (-9.0, 5.0, 20.0, 0.0), (8.0, -7.0, 30.0, 100.0)];
+    for (x, y, theta, phi) in poses {
+        let at = axis(x, y, theta, phi);
+        let what = format!("{x} {y} {theta}°");
+        let (found, mean) = both.along(&at, PATHS);
+        agree(&what, (found, mean), found, 1e-3, 8e-3);
+        let (found, mean) = both.seen(&at, RAYS);
+        agree(&format!("beam, {what}"), (found, mean), found, stated + both.stated(), 8e-3);
+    }
+    // The wall's face, seen over the floor: the sample's plane is crossed beyond it.
+    for (y, z) in [(0.0, 10.0), (20.0, 30.0), (-10.0, 2.0)] {
+        let (theta, far) = (50f64, 1.191_753_592_594_21);
+        let at = axis(-12.0 - z * far, y, theta, 0.0);
+        let (found, _) = both.along(&at, 1);
+        let place = DVec3::new(-12.0, y, z) * 1e-3 + at.direction * 1e-4;
+        let mean = crate::beam::along(&both.world, place, -at.direction, PATHS, 5);
+        agree(&format!("wall at {y} {z}"), (found, mean), found, 1e-3, 8e-3);
+    }
+}
+
+#[test]
+fn a_lid_hides_a_part_of_what_a_wall_sends() {
+    let lamp = "[[lamp]]\nkind = \"sphere\"\ncentre_mm = [120, 0, 60]\nradius_mm = 10\n\
+                radiance_w_per_m2_sr = 40\n";
+    let lid = "[[occluder]]\nkind = \"polygon\"\n\
+               corners_mm = [[-8, -15, 12], [-3, -15, 18], [-3, 15, 18], [-8, 15, 12]]\n";
+    let both = Both::new(read(&format!("{FLOOR}{WALL}{lamp}{lid}")), &[], exact_rig());
+    for (x, y) in [(0.0, 0.0), (8.0, 5.0), (-2.0, -4.0)] {
+        let at = axis(x, y, 0.0, 0.0);
+        let (found, mean) = both.along(&at, PATHS);
+        agree(&format!("{x} {y}"), (found, mean), found, 5e-3, 8e-3);
+    }
+}
+
 /// Near the panel, so that all penumbras fall across the poses.
 const BODIES: [&str; 4] = [
     "kind = \"half-plane\"\nx_max_mm = 12\nz_mm = 20\n",
