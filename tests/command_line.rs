@@ -202,5 +202,8 @@ fn effects_are_explained_over_a_plan_and_chosen_by_name() {
     explain(&["--without", "shot-nois"])
         .refused(&["no effect is called", "did you mean shot-noise"]);
     explain(&["--without", "saturation"]).refused(&["saturation", "part of what a reading is"]);
+    bench
+        .gonio(&["frontier", "plan.toml", "--out", "ladder", "--without", "saturation"])
+        .refused(&["saturation", "part of what a reading is"]);
     bench.gonio(&["explain", "plan.toml"]).refused(&["plan.toml", "is a plan, not a scene"]);
 }

@@ -257,6 +257,8 @@ pub(crate) struct FrontierArgs {
     pub(crate) plan: PathBuf,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    #[command(flatten)]
+    pub(crate) effects: EffectArgs,
     /// How many seeds each rung is run with, from --seed upwards.
     #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(crate) seeds: u64,

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde_json::json;
 
 use super::acquire::{Acquired, Pace, acquire};
-use super::args::{EffectArgs, FrontierArgs};
+use super::args::FrontierArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::create;
 use super::output::{say, write_out};
@@ -22,7 +22,7 @@ use super::session::utc_stamp;
 use super::setup::Setup;
 use super::text::{duration, percent, table};
 use crate::export::{write_atomically, write_frontier};
-use crate::journal::Order;
+use crate::journal::{EffectWishes, Order};
 use crate::report::frontier_svg;
 use crate::run::OnFault;
 use crate::study::{FrontierPoint, FrontierRow, LADDER, Rung, coverage, doubling, points};
@@ -35,7 +35,7 @@ type Entry = (usize, u64);
 
 /// Runs the ladder, writes frontier.csv and frontier.svg, and prints the table.
 pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
-    let setup = Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?;
+    let setup = Setup::from_disk(&args.plan, &args.rig, &args.effects)?;
     if setup.stage.is_none() {
         return Err(Failure::with_help(
             format!("{}: errors are known on a simulated rig alone", setup.rig.name),
@@ -145,7 +145,7 @@ fn row(
     Ok(FrontierRow {
         scene: setup.plan_name.clone(),
         strategy: STRATEGY.to_owned(),
-        parameters: rung.parameters(),
+        parameters: parameters(rung, &setup.wishes),
         seed: setup.seed,
         rig_s,
         readings: u32::try_from(readings).unwrap_or(u32::MAX),
@@ -156,6 +156,16 @@ fn row(
         error_shape_rms_relative: score.shape_rms_relative,
         compute_s: began.elapsed().as_secs_f64(),
     })
+}
+
+/// The rung's, and what was wanted of the simulated effects.
+fn parameters(rung: Rung, wishes: &EffectWishes) -> String {
+    let EffectWishes { tolerance, force, without, .. } = wishes;
+    let mut words = vec![rung.parameters()];
+    words.extend(tolerance.map(|tolerance| format!("tolerance={tolerance}")));
+    words.extend(force.iter().map(|effect| format!("force={effect}")));
+    words.extend(without.iter().map(|effect| format!("without={effect}")));
+    words.join(" ")
 }
 
 fn as_text(rows: &[FrontierRow], points: &[FrontierPoint]) -> String {
@@ -199,4 +209,26 @@ fn as_json(row: &FrontierRow) -> serde_json::Value {
         "compute_s": row.compute_s,
         "error_shape_rms_relative": row.error_shape_rms_relative,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_says_what_was_wanted_of_the_effects() {
+        let named = |wishes: &EffectWishes| parameters(LADDER[2], wishes);
+        assert_eq!(named(&EffectWishes::default()), LADDER[2].parameters());
+        let wishes = EffectWishes {
+            tolerance: Some(1e-4),
+            force: vec!["finite-beam".into()],
+            without: vec!["shot-noise".into(), "read-noise".into()],
+            ignores_plan: false,
+        };
+        assert_eq!(
+            named(&wishes),
+            "density=1.000 dwell=1.000 tolerance=0.0001 force=finite-beam without=shot-noise \
+             without=read-noise"
+        );
+    }
 }

@@ -8,7 +8,7 @@ pub struct FrontierRow {
     pub scene: String,
     /// The strategy's name.
     pub strategy: String,
-    /// The rung's parameters, `key=value` joined by spaces.
+    /// The rung's parameters and wishes for effects, `key=value` joined by spaces.
     pub parameters: String,
     /// The seed of the simulated rig.
     pub seed: u64,
