@@ -93,7 +93,14 @@ fn a_run_killed_after_its_last_reading_gets_its_files_from_a_resume() {
     let bench = quick();
     bench.gonio(&["run", "plan.toml", "--out", "whole"]).well();
     bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
-    for name in ["samples.csv", "samples.meta.json", "readings.csv", "fit.json", "accuracy.csv"] {
+    for name in [
+        "samples.csv",
+        "samples.meta.json",
+        "readings.csv",
+        "fit.json",
+        "accuracy.csv",
+        "report.html",
+    ] {
         std::fs::remove_file(bench.path("out").join(name)).unwrap();
     }
     let said = bench.gonio(&["resume", "out", "--json"]).well().says(&["nothing is left"]);

@@ -44,7 +44,7 @@ const PURE: [&str; 9] = [
 
 /// Where a library is known: SQL, HTTP, arguments, serial ports, terminals and linear algebra can
 /// each be replaced by changing these places alone.
-const KNOWN_IN: [(&str, &[&str]); 8] = [
+const KNOWN_IN: [(&str, &[&str]); 9] = [
     ("rusqlite", &["src/journal/"]),
     ("hyper", &["src/daemon/http/", "src/cli/client.rs"]),
     ("clap", &["src/cli/args.rs", "src/cli/mod.rs"]),
@@ -52,6 +52,7 @@ const KNOWN_IN: [(&str, &[&str]); 8] = [
     ("serialport", &["src/device/"]),
     ("indicatif", &["src/cli/"]),
     ("faer", &["fit/src/"]),
+    ("kuva", &["src/report/"]),
     ("rand_pcg", &["sim/src/"]),
 ];
 

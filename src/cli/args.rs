@@ -23,7 +23,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Acquire, journal, fit and export: the main job.
+    /// Acquire, journal, fit, export and report: the main job.
     ///
     /// Example: gonio run examples/luminaire/plan.toml
     Run(RunArgs),

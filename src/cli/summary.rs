@@ -6,6 +6,7 @@ use std::path::Path;
 use fit::{BeamRows, Fit};
 use serde_json::{Value, json};
 
+use super::report::REPORT;
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::text::{duration, percent, row, table, with_uncertainty};
@@ -48,6 +49,7 @@ impl Summary<'_> {
         }
         rows.extend(self.fit_rows());
         rows.push(row("folder", self.folder.display().to_string()));
+        rows.push(row("report", self.folder.join(REPORT).display().to_string()));
         table(&rows)
     }
 
@@ -100,6 +102,7 @@ impl Summary<'_> {
             "wall_s": self.wall_s,
             "flags": self.flags().into_iter().map(|(f, n)| (f.to_owned(), json!(n))).collect::<serde_json::Map<_, _>>(),
             "folder": self.folder.display().to_string(),
+            "report": self.folder.join(REPORT).display().to_string(),
         });
         match &results.fitted {
             Ok(fitted) => {

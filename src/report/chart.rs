@@ -138,7 +138,7 @@ impl Chart {
             .filter(|v| *v > 0.0 || !self.is_logarithmic)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         if self.is_logarithmic {
-            return (round_down_1_2_5(low), round_up_1_2_5(high));
+            return (round_down_1_2_5(0.97 * low), round_up_1_2_5(high));
         }
         let span = high - low;
         let room = if span > 0.0 { 0.05 * span } else { (0.05 * low.abs()).max(1e-12) };
@@ -168,9 +168,7 @@ impl Series {
         kept.dedup();
         self.pick(&kept);
         let name = if self.name.is_empty() { "points" } else { &self.name };
-        Some(format!(
-            " Of {all} {name} every {stride}th is drawn, with the lowest and the highest."
-        ))
+        Some(format!(" Of {all} {name} one in {stride} is drawn, with the lowest and the highest."))
     }
 
     fn pick(&mut self, kept: &[usize]) {
@@ -305,7 +303,7 @@ mod tests {
         points[77_777].1 = 5.0;
         let mut thinned = chart(points);
         let note = thinned.series[0].thin().unwrap();
-        assert!(note.contains("100000 readings every 125th"), "{note}");
+        assert!(note.contains("100000 readings one in 125 is"), "{note}");
         assert!(thinned.series[0].points.len() <= MARKS_MAX + 2);
         assert!(thinned.series[0].points.contains(&(77_777.0, 5.0)));
     }

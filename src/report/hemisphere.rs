@@ -4,11 +4,12 @@
 //!
 //! It is handed functions of direction. What they are evaluated from it does not know.
 
-use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, SQRT_2};
+use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, SQRT_2, TAU};
 
 use super::coverage::Coverage;
 use super::raster::{self, Cell, Frame};
 use super::svg::{Anchor, Picture, Svg, marks, px};
+use super::ticks::significant;
 
 const NAME: &str = "hemisphere";
 const RADIUS: f64 = 150.0;
@@ -31,8 +32,8 @@ pub struct Hemisphere<'a> {
     pub value: &'a dyn Fn(f64, f64) -> f64,
     /// Its standard uncertainty there: combined, and without the scale that all readings share.
     pub u: &'a dyn Fn(f64, f64) -> [f64; 2],
-    /// At how many places across the disk the uncertainty is asked for; between them it is
-    /// interpolated.
+    /// The square root of how many places the uncertainty is asked at, on rings and spokes;
+    /// between them it is interpolated.
     pub u_side: usize,
     /// The directions of the readings that the field rests on.
     pub directions: &'a [(f64, f64)],
@@ -65,47 +66,66 @@ impl Hemisphere<'_> {
         for (i, cells) in [&values, &combined, &rest].into_iter().enumerate() {
             let panel = Panel::new(i, limit);
             panel.map(&mut svg, cells, ends[i]);
-            panel.frame(&mut svg, &headings[i]);
+            panel.frame(&mut svg, &headings[i], "over");
             raster::bar(&mut svg, panel.beside(), 2.0 * RADIUS, ends[i], self.unit);
         }
         let drawn = self.read(&mut svg, &Panel::new(3, limit), &values);
         let has_gaps = values.iter().any(|value| value.is_some_and(f64::is_nan));
         let has_gaps = has_gaps || limit < core::f64::consts::FRAC_PI_2;
-        let caption = self.caption(has_gaps.then(|| coverage.reach_rad()), drawn);
+        let gap = has_gaps.then(|| (coverage.reach_rad(), self.unmeasured_share(&coverage)));
+        let caption = self.caption(gap, drawn);
         Picture { name: NAME, title, caption, svg: svg.finish() }
     }
 
     fn uncertainties(&self, coverage: &Coverage) -> [Cells; 2] {
-        let side = self.u_side.clamp(2, SIDE);
-        let nodes = side + 1;
-        let at = |i: usize| 2.0 * i as f64 / side as f64 - 1.0;
+        let (rings, spokes) = ((self.u_side / 2).max(2), (2 * self.u_side).max(8));
+        let limit = SQRT_2 * libm::sin(0.5 * coverage.theta_max_rad());
         let node = |i: usize| {
-            let (theta, phi) = nearest_direction(at(i % nodes), at(i / nodes));
+            let r = limit * (i / spokes) as f64 / rings as f64;
+            let phi = TAU * (i % spokes) as f64 / spokes as f64;
+            let (theta, phi) = nearest_direction(r * libm::cos(phi), r * libm::sin(phi));
             (self.u)(theta, phi)
         };
-        let lattice: Vec<[f64; 2]> = (0..nodes * nodes).map(node).collect();
-        let split = |t: f64| {
-            let t = 0.5 * (t + 1.0) * side as f64;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to side
-            let below = (t as usize).min(side - 1);
-            (below, t - below as f64)
+        let lattice: Vec<[f64; 2]> = (0..(rings + 1) * spokes).map(node).collect();
+        let split = |t: f64, count: usize| {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to count
+            let below = (t * count as f64) as usize;
+            let below = below.min(count - 1);
+            (below, t * count as f64 - below as f64)
         };
         [0, 1].map(|which| {
             cells(coverage, |theta, phi| {
-                let (x, y) = on_disk(theta, phi);
-                let ((i, a), (j, b)) = (split(x), split(y));
-                let node = |i: usize, j: usize| lattice[j * nodes + i][which];
-                let row = |j: usize| (1.0 - a) * node(i, j) + a * node(i + 1, j);
-                (1.0 - b) * row(j) + b * row(j + 1)
+                let (i, a) = split(SQRT_2 * libm::sin(0.5 * theta) / limit, rings);
+                let (j, b) = split(phi.rem_euclid(TAU) / TAU, spokes);
+                let node = |i: usize, j: usize| lattice[i * spokes + j % spokes][which];
+                let ring = |i: usize| (1.0 - b) * node(i, j) + b * node(i, j + 1);
+                (1.0 - a) * ring(i) + a * ring(i + 1)
             })
         })
+    }
+
+    /// How much of what leaves into the hemisphere, by the field's own values, goes where nothing
+    /// was measured; `None` where nothing leaves.
+    fn unmeasured_share(&self, coverage: &Coverage) -> Option<f64> {
+        let (mut all, mut unmeasured) = (0.0, 0.0);
+        for i in 0..SIDE * SIDE {
+            let (x, y) = (place(i % SIDE), -place(i / SIDE));
+            if libm::hypot(x, y) > 1.0 {
+                continue;
+            }
+            let (theta, phi) = nearest_direction(x, y);
+            let part = (self.value)(theta, phi) * libm::cos(theta);
+            all += part;
+            unmeasured += if coverage.holds(theta, phi) { 0.0 } else { part };
+        }
+        (all > 0.0).then(|| unmeasured / all)
     }
 
     /// Where readings were taken; how many of them are drawn.
     fn read(&self, svg: &mut Svg, panel: &Panel, values: &[Option<f64>]) -> usize {
         let gaps: Cells = values.iter().map(|value| value.filter(|v| v.is_nan())).collect();
         panel.map(svg, &gaps, (0.0, 1.0));
-        panel.frame(svg, "directions read");
+        panel.frame(svg, "directions read", "grid");
         let stride = self.directions.len().div_ceil(MARKS_MAX).max(1);
         let shown = self.directions.iter().step_by(stride);
         let points = shown.clone().map(|&(theta, phi)| {
@@ -118,7 +138,7 @@ impl Hemisphere<'_> {
         shown.count()
     }
 
-    fn caption(&self, gap_rad: Option<f64>, drawn: usize) -> String {
+    fn caption(&self, gap: Option<(f64, Option<f64>)>, drawn: usize) -> String {
         let mut said = vec![format!(
             "{}. Equal areas are equal solid angles; φ from +x (right) towards +y (up), seen from \
              the detector's side; C = −φ.",
@@ -128,11 +148,15 @@ impl Hemisphere<'_> {
         if drawn < all {
             said.push(format!("{drawn} of {all} directions are drawn."));
         }
-        if let Some(reach) = gap_rad {
+        if let Some((reach, share)) = gap {
             said.push(format!(
                 "Hatched: no reading within {:.1}°, or beyond the largest θ read.",
                 reach.to_degrees()
             ));
+            said.extend(share.map(|share| {
+                let percent = significant(100.0 * share, 2);
+                format!("By the fit, {percent} % of what leaves here goes into hatched directions.")
+            }));
         }
         said.join(" ")
     }
@@ -242,7 +266,7 @@ impl Panel {
     }
 
     /// Heading, rings of θ and spokes of φ, with their labels.
-    fn frame(&self, svg: &mut Svg, heading: &str) {
+    fn frame(&self, svg: &mut Svg, heading: &str, class: &str) {
         let centre = self.centre;
         let at = |theta: f64, phi: f64, out: f64| {
             let (x, y) = on_disk(theta, phi);
@@ -252,13 +276,13 @@ impl Panel {
         svg.label("heading", Anchor::Middle, (centre.0, centre.1 - RADIUS - 38.0), heading);
         let rings = [30.0_f64, 60.0];
         for degrees in rings {
-            svg.circle("over", centre, RADIUS * SQRT_2 * libm::sin(0.5 * degrees.to_radians()));
+            svg.circle(class, centre, RADIUS * SQRT_2 * libm::sin(0.5 * degrees.to_radians()));
         }
         let horizon = core::f64::consts::FRAC_PI_2;
         for turn in 0..8 {
             let degrees = f64::from(turn) * 45.0 - 135.0;
             let phi = degrees.to_radians();
-            svg.line("over", centre, at(horizon, phi, 0.0));
+            svg.line(class, centre, at(horizon, phi, 0.0));
             let anchor = match libm::cos(phi) {
                 x if x > 0.1 => Anchor::Start,
                 x if x < -0.1 => Anchor::End,
@@ -292,27 +316,34 @@ mod tests {
         }
     }
 
-    #[test]
-    fn gaps_are_hatched_and_are_asked_nothing() {
-        let ring = |theta: f64| (-18..18).map(move |i| (theta, f64::from(i) * 0.1745));
-        let read: Vec<(f64, f64)> = (0..8).flat_map(|i| ring(f64::from(i) * 0.15)).collect();
-        let value = |theta: f64, _: f64| {
-            assert!(theta < 1.06, "asked at {theta}");
-            libm::cos(theta)
-        };
-        let map = Hemisphere {
+    fn drawn(read: &[(f64, f64)]) -> Picture {
+        Hemisphere {
             quantity: "radiance L",
             unit: "W/(m² sr)",
-            value: &value,
+            value: &|theta, _| libm::cos(theta),
             u: &|_, _| [0.02, 0.01],
             u_side: 20,
-            directions: &read,
+            directions: read,
             place: "At the middle",
-        };
-        let picture = map.picture();
-        // In each of the four panels, beyond 60 degrees.
-        assert_eq!(picture.svg.matches("class=\"gap beyond\"").count(), 4);
-        assert_eq!(picture.svg.matches("class=\"gap\"").count(), 0);
-        assert!(picture.caption.contains("Hatched") && picture.svg.contains("W/(m² sr)"));
+        }
+        .picture()
+    }
+
+    fn rings(count: u32, keep: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
+        let ring = |i: u32| (-18..18).map(move |k| (f64::from(i) * 0.15, f64::from(k) * 0.1745));
+        (0..count).flat_map(ring).filter(|(theta, phi)| *theta < 0.2 || keep(*phi)).collect()
+    }
+
+    #[test]
+    fn what_was_not_measured_is_hatched_and_its_share_is_named() {
+        // To 60 degrees: of cos θ, cos³ 60.2° = 1/8 of the exitance lies beyond.
+        let cone = drawn(&rings(8, |_| true));
+        assert_eq!(cone.svg.matches("class=\"gap beyond\"").count(), 4);
+        assert_eq!(cone.svg.matches("class=\"gap\"").count(), 0);
+        assert!(cone.caption.contains("12 % of what leaves here"), "{}", cone.caption);
+        let wedge = drawn(&rings(8, |phi| !(0.3..1.8).contains(&phi)));
+        assert_eq!(wedge.svg.matches("class=\"gap\"").count(), 4);
+        assert!(wedge.caption.contains("Hatched: no reading within"), "{}", wedge.caption);
+        assert!(wedge.svg.contains(">W/(m² sr)<"));
     }
 }

@@ -22,3 +22,4 @@ pub use page::{Report, Section, Table};
 pub use plane::Plane;
 pub use polar::Polar;
 pub use svg::Picture;
+pub use ticks::significant;

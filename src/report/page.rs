@@ -12,9 +12,9 @@ h1{font-size:1.6rem;margin:.2em 0}h2{font-size:1.15rem;margin:2em 0 .5em}\
 .banner{border:2px solid var(--b);padding:.5em .8em;margin:1em 0;font-weight:600}\
 table{border-collapse:collapse;margin:.5em 0;font-variant-numeric:tabular-nums}\
 td,th{text-align:left;vertical-align:top;padding:.2em .9em .2em 0;border-bottom:1px solid var(--grid)}\
-th{font-weight:600}td+td{white-space:nowrap}.facts td,td.text{white-space:normal}.facts th{white-space:nowrap;width:11em}.wide{overflow-x:auto}\
+th{font-weight:600}td+td{white-space:nowrap}.facts td,td.text{white-space:normal}tbody td:first-child{min-width:9em}.facts th{white-space:nowrap;width:11em}.wide{overflow-x:auto}\
 figure{margin:1.5em 0;break-inside:avoid}figcaption{color:var(--soft);font-size:.9em;max-width:60em}\
-svg.picture{display:block;max-width:100%;height:auto}.heading{font-weight:600}\
+svg.picture{display:block;max-width:100%;height:auto}\
 ul{padding-left:1.2em}p.note{color:var(--soft)}\
 @media print{body{max-width:none;padding:0}h2{break-after:avoid}tr{break-inside:avoid}\
 .wide{overflow:visible}}";

@@ -72,7 +72,11 @@ impl Plane<'_> {
         raster::bar(&mut svg, (LEFT + width + 30.0, TOP), height, ends, self.unit);
         let all = self.positions.len();
         let thinned = if drawn < all { format!(" ({drawn} of {all})") } else { String::new() };
-        let caption = format!("{}. Dots: where beams met the sample{thinned}.", self.place);
+        let (low, high) = raster::ends(values.iter().copied(), 0.0);
+        let is_flat = values.iter().all(|value| value.to_bits() == values[0].to_bits())
+            || high - low <= 1e-12 * high.abs();
+        let flat = if is_flat { " The fit does not vary with position." } else { "" };
+        let caption = format!("{}. Dots: where beams met the sample{thinned}.{flat}", self.place);
         Picture { name: NAME, title, caption, svg: svg.finish() }
     }
 

@@ -14,9 +14,9 @@ pub(super) const STYLE: &str = "\
 .picture{font-family:system-ui,'DejaVu Sans',Verdana,Arial,sans-serif;font-size:12px;color:var(--ink)}\
 .picture text{fill:var(--ink)}.picture .soft{fill:var(--soft)}\
 .picture .grid{stroke:var(--grid);fill:none}.picture .axis{stroke:var(--ink);fill:none}\
-.picture .over{stroke:var(--paper);stroke-opacity:.45;fill:none}\
+.picture .over{stroke:#fff;stroke-opacity:.4;fill:none}\
 .picture .halo{paint-order:stroke;stroke:var(--paper);stroke-width:3px;stroke-linejoin:round}\
-.picture .paper{fill:var(--paper)}";
+.picture .paper{fill:var(--paper)}.picture .heading{font-weight:600}";
 
 /// A picture, ready to stand in a page or in a file of its own.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -71,7 +71,7 @@ pub(super) fn round_up(value: f64) -> f64 {
 }
 
 /// So many significant digits, with an exponent far from 1.
-pub(super) fn significant(value: f64, digits: usize) -> String {
+pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }

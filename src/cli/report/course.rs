@@ -229,7 +229,7 @@ fn outlook(results: &Results, last: &AccuracyPoint, target: Option<f64>) -> Vec<
     let shared = libm::sqrt((u * u - independent * independent).max(0.0));
     let after = |factor: f64| libm::hypot(shared, independent / libm::sqrt(factor));
     let mut said = vec![format!(
-        "After {} the uncertainty is {}, {} of it shared by all readings. Twice the time would \
+        "After {} the uncertainty is {}, of which {} is shared by all readings. Twice the time would \
          bring {}, if the independent part goes on to fall as the square root of time.",
         duration(last.rig_s),
         percent(u),

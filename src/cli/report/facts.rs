@@ -6,6 +6,7 @@ use crate::cli::results::{Results, targets_planned};
 use crate::cli::setup::Setup;
 use crate::cli::text::{duration, percent};
 use crate::journal::InputRole;
+use crate::report::significant;
 use crate::rig::calibration::{Fitted, Flag};
 
 /// What nobody may overlook.
@@ -128,11 +129,11 @@ fn fit(fitted: &Fitted, words: &Words) -> String {
     let fit = &fitted.fit;
     let unit = words.radiance_unit;
     format!(
-        "{} coefficients from {} readings, condition {:.1}, residuals {:.3e} {unit} RMS",
+        "{} coefficients from {} readings, condition {:.1}, residuals {} {unit} RMS",
         fit.coefficients().len(),
         fit.n_used(),
         fit.condition(),
-        fit.residual_rms()
+        significant(fit.residual_rms(), 3)
     )
 }
 
@@ -152,10 +153,10 @@ pub(super) fn notes(setup: &Setup, results: &Results) -> Vec<String> {
     let fit = &fitted.fit;
     if fit.excess_rms() > 0.0 {
         notes.push(format!(
-            "The readings lie {:.2e} {} RMS further from the fit than their noise explains: what \
+            "The readings lie {} {} RMS further from the fit than their noise explains: what \
              its functions can't follow, or a source that wavers. It counts as scatter from \
              reading to reading; where it is systematic, u is too small.",
-            fit.excess_rms(),
+            significant(fit.excess_rms(), 3),
             words.radiance_unit
         ));
     }
