@@ -36,7 +36,7 @@ pub(crate) fn check(
     Ok(())
 }
 
-fn check_sample(index: usize, sample: &Sample, region: &Region) -> Result<(), FitError> {
+pub(crate) fn check_sample(index: usize, sample: &Sample, region: &Region) -> Result<(), FitError> {
     let ray = &sample.ray;
     let numbers = [
         ("x", ray.x_m),

@@ -62,6 +62,7 @@ mod error;
 mod fitted;
 mod functional;
 mod grid;
+pub mod partial;
 mod peak;
 mod penalty;
 pub mod regression;

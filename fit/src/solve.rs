@@ -100,20 +100,55 @@ pub fn fit_seen(
     .map_err(|_| FitError::OutOfRange)
 }
 
+/// The triangle of samples weighted by what their own fit says, every common component a side of its
+/// own, without the penalty; and their variances.
+pub(crate) fn weighted(
+    samples: &[Sample],
+    region: &Region,
+    model: Penalised,
+    common: &[Common],
+    optics: Option<&Optics>,
+) -> Result<(Triangle, Vec<f64>), FitError> {
+    check(samples, region, model, common)?;
+    let basis = Basis::new(model.basis, *region)?;
+    let prior = Prior::new(&basis, model.penalty)?;
+    if prior.is_none()
+        && let Some(refusal) = undetermined::by_count(samples, &basis)
+    {
+        return Err(refusal);
+    }
+    let design = Design::new(samples, &basis, optics)?;
+    let settled = settle(&design, &prior)?;
+    let sides = sensitivities(&design, &settled, &common.iter().collect::<Vec<_>>())?;
+    let triangle = triangle(&design, &settled.variances, &sides)?;
+    Ok((triangle, settled.variances))
+}
+
 /// What the field makes of the samples' readings.
 pub(crate) fn levels(design: &Design<'_>, coefficients: &[f64]) -> Vec<f64> {
     let mut room = design.room();
     (0..design.samples().len()).map(|i| design.level(i, coefficients, &mut room)).collect()
 }
 
-/// One pass of all rows, each divided by its standard uncertainty, and of the penalty's. `sides` are further right-hand
-/// sides, one vector over the samples each.
+/// What one pass of all rows determines, with the penalty's.
 pub(crate) fn solve(
     design: &Design<'_>,
     variances: &[f64],
     sides: &[Vec<f64>],
     prior: &Prior,
 ) -> Result<Solution, FitError> {
+    let mut triangle = triangle(design, variances, sides)?;
+    prior.absorb_into(&mut triangle, sides.len() + 1);
+    triangle.solve().ok_or(FitError::OutOfRange)
+}
+
+/// One pass of all rows, each divided by its standard uncertainty. `sides` are further right-hand
+/// sides, one vector over the samples each.
+fn triangle(
+    design: &Design<'_>,
+    variances: &[f64],
+    sides: &[Vec<f64>],
+) -> Result<Triangle, FitError> {
     let p = design.basis().len();
     let mut triangle = Triangle::new(p, 1 + sides.len());
     let mut room = design.room();
@@ -133,8 +168,7 @@ pub(crate) fn solve(
         }
         triangle.absorb(&row);
     }
-    prior.absorb_into(&mut triangle, sides.len() + 1);
-    triangle.solve().ok_or(FitError::OutOfRange)
+    Ok(triangle)
 }
 
 /// Whether a component's effect has to go through the factorisation. A scale and an offset don't:
@@ -229,6 +263,6 @@ fn quality(
 
 /// Samples less what they determine of the coefficients, to the nearest number.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between zero and a count
-fn left_over(samples: usize, determined: f64) -> usize {
+pub(crate) fn left_over(samples: usize, determined: f64) -> usize {
     libm::round(samples as f64 - determined).max(0.0) as usize
 }

@@ -118,8 +118,7 @@ fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: f64) -> f64 {
     let sum = |tau2: f64, power: i32| -> f64 {
         terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()
     };
-    let threshold =
-        if has_unknown(samples) { dof } else { dof + EXCESS_SIGMA * (2.0 * dof).sqrt() };
+    let threshold = if has_unknown(samples) { dof } else { threshold(dof) };
     if dof <= 0.0 || sum(0.0, 1) <= threshold {
         return 0.0;
     }
@@ -134,6 +133,11 @@ fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: f64) -> f64 {
         }
     }
     tau2
+}
+
+/// The chi² beyond which residuals of so many degrees of freedom are larger than the stated noise.
+pub(crate) fn threshold(dof: f64) -> f64 {
+    dof + EXCESS_SIGMA * (2.0 * dof).sqrt()
 }
 
 /// What a sample's uncertainty is taken for where only its size matters.

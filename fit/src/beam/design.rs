@@ -94,8 +94,18 @@ impl<'s> Design<'s> {
         basis: &'s Basis,
         optics: Option<&Optics>,
     ) -> Result<Self, FitError> {
-        let beam = optics.map(|optics| Averaged::new(samples, basis, optics)).transpose()?;
-        Ok(Self { samples, basis, beam })
+        Self::of_a_share(samples, basis, optics, samples.len())
+    }
+
+    /// Of samples that are a share of `readings`, whose errors come together.
+    pub(crate) fn of_a_share(
+        samples: &'s [Sample],
+        basis: &'s Basis,
+        optics: Option<&Optics>,
+        readings: usize,
+    ) -> Result<Self, FitError> {
+        let averaged = |optics| Averaged::new(samples, basis, optics, readings);
+        Ok(Self { samples, basis, beam: optics.map(averaged).transpose()? })
     }
 
     pub(crate) fn samples(&self) -> &'s [Sample] {
@@ -230,11 +240,16 @@ pub(crate) fn readings(
 }
 
 impl Averaged {
-    fn new(samples: &[Sample], basis: &Basis, optics: &Optics) -> Result<Self, FitError> {
+    fn new(
+        samples: &[Sample],
+        basis: &Basis,
+        optics: &Optics,
+        readings: usize,
+    ) -> Result<Self, FitError> {
         let averager = Averager::new(optics, basis)?;
         let model = Model::of(samples);
         let size = samples.iter().map(|s| s.value.abs()).fold(f64::MIN_POSITIVE, f64::max);
-        let share = PART_OF_U / (samples.len() as f64).sqrt();
+        let share = PART_OF_U / (readings as f64).sqrt();
         let keeps = samples.len().saturating_mul(basis.len()) <= KEPT_NUMBERS_MAX;
         let mut new = Self {
             averager,
@@ -361,5 +376,6 @@ const PART_OF_U: f64 = 0.1;
 const GAIN: f64 = 0.25;
 /// A cut row is not taken more exactly than this: no outline is known so well.
 const FLOOR: f64 = 1e-4;
-/// Rows are kept from pass to pass up to this many numbers, 256 MB.
-const KEPT_NUMBERS_MAX: usize = 1 << 25;
+/// Rows are kept from pass to pass up to this many numbers, 32 MB: beyond it they are averaged anew
+/// in every pass, so that memory doesn't grow with readings times coefficients.
+const KEPT_NUMBERS_MAX: usize = 1 << 22;

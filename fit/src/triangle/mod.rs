@@ -88,6 +88,50 @@ impl Triangle {
         self.rows = rows;
     }
 
+    /// The upper triangle of unknowns and right-hand sides, packed by columns: R₀₀, R₀₁, R₁₁, ...
+    pub fn packed(&self) -> Vec<f64> {
+        let mut whole = self.clone();
+        whole.settle();
+        let columns = 0..self.columns();
+        columns.flat_map(|j| whole.r.col_as_slice(j)[..=j].to_vec()).collect()
+    }
+
+    /// Takes up a packed triangle of so many rows.
+    ///
+    /// # Panics
+    /// When the length is not that of such a triangle.
+    pub fn from_packed(unknowns: usize, sides: usize, rows: u64, packed: &[f64]) -> Self {
+        let mut new = Self::new(unknowns, sides);
+        let columns = new.columns();
+        assert_eq!(packed.len(), columns * (columns + 1) / 2, "a triangle's length");
+        for j in 0..columns {
+            new.r.col_as_slice_mut(j)[..=j].copy_from_slice(&packed[j * (j + 1) / 2..][..=j]);
+        }
+        new.rows = rows;
+        new
+    }
+
+    /// The triangle of rows that are so many times as large.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut scaled = self.clone();
+        scaled.settle();
+        scaled.r *= faer::Scale(factor);
+        scaled
+    }
+
+    /// The sum of squared residuals that these unknowns leave of the first right-hand side.
+    pub fn residual_squares(&self, unknowns: &[f64]) -> f64 {
+        let mut whole = self.clone();
+        whole.settle();
+        let p = self.unknowns;
+        let residual = |i: usize| {
+            let fitted: f64 = (i..p).map(|j| whole.r[(i, j)] * unknowns[j]).sum();
+            whole.r[(i, p)] - fitted
+        };
+        (0..p).map(residual).map(|r| r * r).sum::<f64>() + whole.r[(p, p)].powi(2)
+    }
+
     /// How many rows were taken in.
     pub fn rows(&self) -> u64 {
         self.rows

@@ -1,0 +1,355 @@
+//! Fits of shares of the readings, to be merged: what a share says of the coefficients, in memory
+//! that doesn't grow with its readings, and the fit of several shares together.
+//!
+//! A partial fit holds the triangle of its rows, weighted by what is known of each reading alone. So
+//! the merge of partial fits equals the one of all readings to rounding, in whatever shares and order.
+//! What can be told only from all readings together is done at the end, on the triangle: where
+//! nothing is known of the noise, or the residuals scatter beyond it, the residuals' size scales
+//! every u alike. It knows no file: [`Parts`] are the numbers to be stored.
+//!
+//! ```
+//! use fit::partial::{Accumulator, Weighting};
+//! use fit::{BasisSpec, Noise, Ray, Region, Sample};
+//!
+//! let sample = |i: u32| Sample {
+//!     ray: Ray { x_m: 0.0, y_m: 0.0, theta_rad: f64::from(i % 8) * 0.2, phi_rad: 0.1 },
+//!     value: 100.0 + f64::from(i % 3),
+//!     noise: Noise::Unknown,
+//! };
+//! let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 1.4 };
+//! let basis = BasisSpec::zernike(0, 0);
+//! let share = |from: u32| -> Result<_, Box<dyn std::error::Error>> {
+//!     let mut share = Accumulator::new(region, basis, None, Weighting::Alike)?;
+//!     share.absorb(&(from..from + 30).map(sample).collect::<Vec<_>>())?;
+//!     Ok(share.finish())
+//! };
+//! let mut all = share(0)?;
+//! all.merge(&share(30)?)?;
+//! let field = all.fit(None)?;
+//! assert_eq!(field.n_used(), 60);
+//! assert!((field.radiance(&sample(0).ray).value - 101.0).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub use closing::Closed;
+
+use std::fmt;
+
+use crate::basis::Basis;
+use crate::beam::Optics;
+use crate::beam::design::Design;
+use crate::check::check_sample;
+use crate::triangle::Triangle;
+use crate::{BasisSpec, Common, FitError, Noise, Penalised, Penalty, Region, Sample};
+
+mod closing;
+
+/// What the rows of a share are weighted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weighting {
+    /// Each reading by its stated variance.
+    Stated,
+    /// All readings alike: the residuals of the whole will tell their variance.
+    Alike,
+}
+
+/// What a share of the readings says.
+#[derive(Debug, Clone)]
+pub struct Partial {
+    basis: Basis,
+    penalty: Penalty,
+    weighting: Weighting,
+    common: Vec<String>,
+    sums: Sums,
+    triangle: Triangle,
+}
+
+/// What is summed beside the triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sums {
+    /// Readings taken in.
+    pub readings: u64,
+    /// Σ value², in the values' unit squared.
+    pub value_squares: f64,
+    /// Σ 1/variance.
+    pub weights: f64,
+    /// The smallest and the largest variance.
+    pub variance: (f64, f64),
+}
+
+/// The numbers that a partial fit consists of, to be stored and taken up again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// What the fit stands for.
+    pub region: Region,
+    /// Which functions.
+    pub basis: BasisSpec,
+    /// What will be held against them; no share holds it yet.
+    pub penalty: Penalty,
+    /// What the rows are weighted by.
+    pub weighting: Weighting,
+    /// The common components that were carried along, each a right-hand side of its own.
+    pub common: Vec<String>,
+    /// What is summed beside the triangle.
+    pub sums: Sums,
+    /// The upper triangle of functions, values and common components, packed by columns.
+    pub triangle: Vec<f64>,
+}
+
+/// Why partial fits can't be merged, or a share not be taken in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PartialError {
+    /// They don't stand for the same: give all shares the same region and basis.
+    Differ {
+        /// What differs.
+        what: &'static str,
+    },
+    /// A reading's noise is not what the weighting calls for.
+    Noise {
+        /// The sample, from 0.
+        index: usize,
+    },
+    /// As of a fit.
+    Fit(FitError),
+}
+
+impl PartialError {
+    /// The sample that is to blame, from 0, where one is.
+    pub fn index(&self) -> Option<usize> {
+        match *self {
+            Self::Noise { index }
+            | Self::Fit(
+                FitError::NotFinite { index, .. }
+                | FitError::Variance { index, .. }
+                | FitError::ShotNoise { index, .. }
+                | FitError::Theta { index, .. }
+                | FitError::OutsideRegion { index, .. },
+            ) => Some(index),
+            Self::Fit(_) | Self::Differ { .. } => None,
+        }
+    }
+}
+
+impl From<FitError> for PartialError {
+    fn from(error: FitError) -> Self {
+        Self::Fit(error)
+    }
+}
+
+impl fmt::Display for PartialError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Differ { what } => write!(f, "partial fits differ in their {what}"),
+            Self::Noise { index } => write!(
+                f,
+                "sample {index}: expected a known variance, as the samples before it have"
+            ),
+            Self::Fit(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for PartialError {}
+
+/// Takes readings in, in blocks of any size, and forgets them.
+#[derive(Debug)]
+pub struct Accumulator {
+    partial: Partial,
+    optics: Option<Optics>,
+}
+
+impl Accumulator {
+    /// Nothing yet, of a field over a region in a basis.
+    pub fn new(
+        region: Region,
+        model: impl Into<Penalised>,
+        optics: Option<Optics>,
+        weighting: Weighting,
+    ) -> Result<Self, FitError> {
+        let Penalised { basis, penalty } = model.into();
+        let basis = basis_over(basis, penalty, region)?;
+        let triangle = Triangle::new(basis.len(), 1);
+        let (common, sums) = (Vec::new(), Sums::NONE);
+        Ok(Self { partial: Partial { basis, penalty, weighting, common, sums, triangle }, optics })
+    }
+
+    /// Takes a block in. An error leaves everything as it was before the block. Where there is a
+    /// beam, the rows are as exact as a fit of ten million readings needs them.
+    pub fn absorb(&mut self, samples: &[Sample]) -> Result<(), PartialError> {
+        let Partial { basis, weighting, sums, triangle, .. } = &mut self.partial;
+        for (index, sample) in samples.iter().enumerate() {
+            check_sample(index, sample, basis.region())?;
+            if *weighting == Weighting::Stated && !matches!(sample.noise, Noise::Fixed { .. }) {
+                return Err(PartialError::Noise { index });
+            }
+        }
+        let optics = self.optics.as_ref();
+        let design = Design::of_a_share(samples, basis, optics, READINGS_FORESEEN)?;
+        let mut room = design.room();
+        let mut row = vec![0.0; basis.len() + 1];
+        for (i, sample) in samples.iter().enumerate() {
+            let variance = match sample.noise {
+                Noise::Fixed { variance } if *weighting == Weighting::Stated => variance,
+                _ => 1.0,
+            };
+            design.row(i, &mut room, &mut row[..basis.len()]);
+            row[basis.len()] = sample.value;
+            let weight = 1.0 / variance.sqrt();
+            for value in &mut row {
+                *value *= weight;
+            }
+            triangle.absorb(&row);
+            sums.note(sample.value, variance);
+        }
+        Ok(())
+    }
+
+    /// Ends the share.
+    pub fn finish(self) -> Partial {
+        self.partial
+    }
+}
+
+impl Partial {
+    /// A share that is fitted by itself first, which tells the level of each reading and so its
+    /// noise, and what each common component does to it.
+    pub fn of(
+        samples: &[Sample],
+        region: &Region,
+        model: impl Into<Penalised>,
+        common: &[Common],
+        optics: Option<&Optics>,
+    ) -> Result<Self, FitError> {
+        let model = model.into();
+        let (triangle, variances) = crate::solve::weighted(samples, region, model, common, optics)?;
+        let mut sums = Sums::NONE;
+        for (sample, variance) in samples.iter().zip(&variances) {
+            sums.note(sample.value, *variance);
+        }
+        Ok(Self {
+            basis: Basis::new(model.basis, *region)?,
+            penalty: model.penalty,
+            weighting: Weighting::Stated,
+            common: common.iter().map(|common| common.name.clone()).collect(),
+            sums,
+            triangle,
+        })
+    }
+
+    /// Takes up stored parts.
+    pub fn from_parts(parts: Parts) -> Result<Self, FitError> {
+        let basis = basis_over(parts.basis, parts.penalty, parts.region)?;
+        let (p, sides) = (basis.len(), 1 + parts.common.len());
+        let expected = (p + sides) * (p + sides + 1) / 2;
+        let found = parts.triangle.iter().filter(|value| value.is_finite()).count();
+        if found != expected || parts.triangle.len() != expected {
+            return Err(FitError::Parts { what: "triangle", expected, found });
+        }
+        if !parts.sums.is_sound() {
+            return Err(FitError::Parts { what: "sums", expected: 4, found: 0 });
+        }
+        Ok(Self {
+            basis,
+            penalty: parts.penalty,
+            weighting: parts.weighting,
+            common: parts.common,
+            sums: parts.sums,
+            triangle: Triangle::from_packed(p, sides, parts.sums.readings, &parts.triangle),
+        })
+    }
+
+    /// The numbers that it consists of.
+    pub fn parts(&self) -> Parts {
+        Parts {
+            region: *self.basis.region(),
+            basis: self.basis.spec(),
+            penalty: self.penalty,
+            weighting: self.weighting,
+            common: self.common.clone(),
+            sums: self.sums,
+            triangle: self.triangle.packed(),
+        }
+    }
+
+    /// Takes in what another share says. Common components of the same name are taken for one and
+    /// the same, wholly correlated.
+    pub fn merge(&mut self, other: &Self) -> Result<(), PartialError> {
+        let differs = |what| Err(PartialError::Differ { what });
+        if self.basis.spec() != other.basis.spec() {
+            return differs("basis");
+        }
+        if self.basis.region() != other.basis.region() {
+            return differs("region");
+        }
+        if self.penalty != other.penalty {
+            return differs("penalty");
+        }
+        if self.weighting != other.weighting {
+            return differs("weights: some samples state an uncertainty, others none");
+        }
+        if self.common != other.common {
+            return differs("common components");
+        }
+        self.triangle.merge(&other.triangle);
+        self.sums.merge(&other.sums);
+        Ok(())
+    }
+
+    /// Readings taken in.
+    pub fn readings(&self) -> u64 {
+        self.sums.readings
+    }
+}
+
+fn basis_over(spec: BasisSpec, penalty: Penalty, region: Region) -> Result<Basis, FitError> {
+    if !region.is_sound() {
+        return Err(FitError::Region);
+    }
+    spec.checked_len()?;
+    penalty.check()?;
+    Basis::new(spec, region)
+}
+
+impl Sums {
+    const NONE: Self =
+        Self { readings: 0, value_squares: 0.0, weights: 0.0, variance: (f64::INFINITY, 0.0) };
+
+    fn note(&mut self, value: f64, variance: f64) {
+        self.readings += 1;
+        self.value_squares += value * value;
+        self.weights += 1.0 / variance;
+        self.variance = (self.variance.0.min(variance), self.variance.1.max(variance));
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.readings += other.readings;
+        self.value_squares += other.value_squares;
+        self.weights += other.weights;
+        let ((low, high), (other_low, other_high)) = (self.variance, other.variance);
+        self.variance = (low.min(other_low), high.max(other_high));
+    }
+
+    fn mean_square(&self) -> f64 {
+        self.value_squares / self.readings as f64
+    }
+
+    fn is_sound(&self) -> bool {
+        let Self { readings, value_squares, weights, variance: (low, high) } = *self;
+        if readings == 0 {
+            return *self == Self::NONE;
+        }
+        value_squares.is_finite()
+            && value_squares >= 0.0
+            && weights.is_finite()
+            && weights > 0.0
+            && low > 0.0
+            && low <= high
+            && high.is_finite()
+    }
+}
+
+/// How many readings the rows of a beam are made exact for.
+const READINGS_FORESEEN: usize = 10_000_000;
+
+#[cfg(test)]
+mod tests;
