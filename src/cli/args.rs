@@ -180,9 +180,30 @@ pub(crate) struct ResumeArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArgs {
-    /// A run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance.
+    /// A run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance. With --merge
+    /// the first partial fit.
     #[arg(value_name = "DIR_or_CSV")]
     pub(crate) source: PathBuf,
+    /// Further partial fits, with --merge.
+    #[arg(value_name = "PART", requires = "merge")]
+    pub(crate) further: Vec<PathBuf>,
+    /// Fit these samples as a share of more, and write what they say to -o, to be merged.
+    #[arg(long, requires = "output", conflicts_with_all = ["merge", "at", "json"])]
+    pub(crate) partial: bool,
+    /// Merge partial fits: the fit of all their samples.
+    #[arg(long, conflicts_with_all = ["angular_degree", "position_degree", "rig"])]
+    pub(crate) merge: bool,
+    /// With --partial of a CSV: from where to where all shares lie, the same for each.
+    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
+        allow_hyphen_values = true)]
+    pub(crate) x_mm: Option<(f64, f64)>,
+    /// As --x-mm.
+    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
+        allow_hyphen_values = true)]
+    pub(crate) y_mm: Option<(f64, f64)>,
+    /// With --partial of a CSV: the cone's half angle that all shares stand for.
+    #[arg(long, value_name = "DEG", requires = "partial")]
+    pub(crate) theta_max_deg: Option<f64>,
     /// Highest order of the Zernike polynomials over direction.
     #[arg(long, value_name = "N")]
     pub(crate) angular_degree: Option<usize>,
@@ -192,7 +213,8 @@ pub(crate) struct FitArgs {
     /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg).
     #[arg(long, value_name = "FILE")]
     pub(crate) at: Option<PathBuf>,
-    /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all.
+    /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all. Of
+    /// partial fits --merge takes it.
     #[arg(long, value_name = "U")]
     pub(crate) u_relative: Option<f64>,
     /// For a CSV: the rig whose detector read it (a file, or "simulated"), for its beam's width.
@@ -220,6 +242,17 @@ pub(crate) struct ReportArgs {
     /// Print what was written as one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Two numbers, a comma between.
+fn interval(text: &str) -> Result<(f64, f64), String> {
+    let numbers = || {
+        let (from, to) = text.split_once(',')?;
+        Some((from.trim().parse::<f64>().ok()?, to.trim().parse::<f64>().ok()?))
+    };
+    numbers()
+        .filter(|(from, to)| from.is_finite() && to.is_finite() && from <= to)
+        .ok_or_else(|| "expected from and to in mm with a comma between, -20,20 say".to_owned())
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

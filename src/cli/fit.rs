@@ -10,6 +10,7 @@ use super::args::FitArgs;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
 use super::output::{note, say, write_out};
+use super::partial;
 use super::results::{Results, read_run};
 use super::setup::rig_at;
 use super::summary::field_rows;
@@ -20,13 +21,13 @@ use crate::export::{
 use crate::plan::FitSpec;
 
 /// The degrees for a CSV, where the command line does not say.
-const ANGULAR_DEGREE: usize = 6;
-const POSITION_DEGREE: usize = 0;
+pub(super) const ANGULAR_DEGREE: usize = 6;
+pub(super) const POSITION_DEGREE: usize = 0;
 /// A region's cone ends this far beyond the outermost sample of a CSV at most.
 const THETA_MAX_RAD: f64 = core::f64::consts::FRAC_PI_2;
-const FIT_HELP: &str =
+pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
-const CSV_HELP: &str = "expected a header with x_mm, y_mm, theta_deg, phi_deg and for example \
+pub(super) const CSV_HELP: &str = "expected a header with x_mm, y_mm, theta_deg, phi_deg and for example \
                         radiance_w_per_m2_sr, commas between, a point for the decimals";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
@@ -34,6 +35,12 @@ const CSV_BYTES_MAX: u64 = 2 << 30;
 /// Fits again and prints what came out.
 pub(crate) fn fit(args: &FitArgs) -> Outcome {
     let rays = args.at.as_deref().map(rays_at).transpose()?;
+    if args.merge {
+        return partial::merge(args, rays);
+    }
+    if args.partial {
+        return partial::partial(args);
+    }
     if args.source.is_dir() { fit_run(args, rays) } else { fit_csv(args, rays) }
 }
 
@@ -132,7 +139,7 @@ fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
 }
 
 /// The beam of a rig's detector; where the sample ends a CSV does not say.
-fn optics_of(path: &Path) -> Result<Optics, Failure> {
+pub(super) fn optics_of(path: &Path) -> Result<Optics, Failure> {
     let rig = rig_at(&mut Inputs::from_disk(), path)?;
     let beam = rig.detector.beam().map_err(|error| Failure::start(error.to_string()))?;
     Ok(Optics { beam, outline: None })
@@ -170,7 +177,7 @@ fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// Prints the fit: at listed rays where those are asked for, as JSON, or as a table.
-fn show(
+pub(super) fn show(
     args: &FitArgs,
     rays: Option<Vec<RayColumns>>,
     file: &FitFile<'_>,

@@ -17,6 +17,7 @@ mod inputs;
 mod nominal;
 mod outlook;
 mod output;
+mod partial;
 mod plan;
 mod ports;
 mod progress;

@@ -156,21 +156,28 @@ impl InputSamples {
     /// it, relative to the root mean square of all values: a u relative to each value would favour
     /// those that came out low. With neither, the fit estimates one from its residuals.
     pub fn fit_samples(&self, u_relative: Option<f64>) -> Vec<fit::Sample> {
-        let used = || self.samples.iter().filter(|sample| is_used(sample.flags));
-        let squares: f64 = used().map(|sample| sample.value * sample.value).sum();
-        let mean_square = squares / used().count().max(1) as f64;
+        let squares: f64 = self.used().map(|sample| sample.value * sample.value).sum();
+        let mean_square = squares / self.used().count().max(1) as f64;
         let fallback = match u_relative {
             Some(u_relative) => Noise::Fixed { variance: u_relative * u_relative * mean_square },
             None => Noise::Unknown,
         };
-        let noise = |u: Option<f64>| u.map_or(fallback, |u| Noise::Fixed { variance: u * u });
-        used()
-            .map(|sample| fit::Sample {
-                ray: sample.ray.ray(),
-                value: sample.value,
-                noise: noise(sample.u),
-            })
-            .collect()
+        self.used().map(|sample| sample.fit_sample(fallback)).collect()
+    }
+
+    /// The samples as the fit takes them, and the lines that they stand on.
+    pub fn fit_samples_with_lines(&self) -> (Vec<fit::Sample>, Vec<u64>) {
+        self.used().map(|sample| (sample.fit_sample(Noise::Unknown), sample.line)).unzip()
+    }
+
+    fn used(&self) -> impl Iterator<Item = &InputSample> {
+        self.samples.iter().filter(|sample| is_used(sample.flags))
+    }
+
+    /// The same samples, so many lines further down.
+    pub(super) fn later(mut self, lines: u64) -> Self {
+        self.samples.iter_mut().for_each(|sample| sample.line += lines);
+        self
     }
 
     /// Whether the file states an uncertainty.
@@ -184,9 +191,26 @@ impl InputSamples {
     }
 }
 
+impl InputSample {
+    fn fit_sample(&self, without_u: Noise) -> fit::Sample {
+        let noise = self.u.map_or(without_u, |u| Noise::Fixed { variance: u * u });
+        fit::Sample { ray: self.ray.ray(), value: self.value, noise }
+    }
+}
+
 /// Where the sample that a beam reached beyond ends, a file doesn't say.
 fn is_used(flags: Flags) -> bool {
     !flags.excludes_from_fit() && !flags.contains(Flag::OffSample)
+}
+
+impl CsvError {
+    /// The same, so many lines further down.
+    pub(super) fn later(mut self, lines: u64) -> Self {
+        if let Self::Malformed { line, .. } | Self::Field { line, .. } = &mut self {
+            *line += lines;
+        }
+        self
+    }
 }
 
 struct Table<'b> {

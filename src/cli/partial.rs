@@ -1,0 +1,211 @@
+//! `gonio fit --partial` and `--merge`: shares of the readings fitted apart, on as many machines as
+//! there are, and together again.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use std::process::ExitCode;
+
+use fit::partial::{Accumulator, Partial, Weighting};
+use fit::{BasisSpec, Optics, Region};
+
+use super::args::FitArgs;
+use super::failure::{Failure, Outcome};
+use super::fit::{ANGULAR_DEGREE, CSV_HELP, FIT_HELP, POSITION_DEGREE, optics_of, show};
+use super::output::say;
+use super::results::{basis, fit_region, optics, read_run};
+use super::text::{row, table};
+use crate::export::{
+    BlockError, FitFile, InputSamples, PartialFile, RayColumns, ReadPartial, read_sample_blocks,
+    write_atomically,
+};
+use crate::plan::FitSpec;
+use crate::rig::Quantity;
+use crate::rig::calibration::calibrate;
+
+/// A partial fit of 4,096 coefficients and dozens of common components is far below.
+const PARTIAL_BYTES_MAX: u64 = 1 << 30;
+const REGION_HELP: &str = "say what all shares stand for, --x-mm=-20,20 --y-mm=-20,20 \
+                           --theta-max-deg 80 for example: each share alone can't know it";
+const PARTIAL_HELP: &str = "give files that `gonio fit --partial` wrote, of the same region, \
+                            basis and detector";
+
+/// Fits a share and writes it.
+pub(super) fn partial(args: &FitArgs) -> Outcome {
+    if args.u_relative.is_some() {
+        return Err(Failure::with_help(
+            "--u-relative: a share alone doesn't know the root mean square of all samples",
+            "give it to --merge",
+        ));
+    }
+    let file = if args.source.is_dir() { of_run(args)? } else { of_csv(args)? };
+    let Some(path) = &args.output else {
+        return Err(Failure::with_help("--partial: no file to write", "add -o part.bin"));
+    };
+    write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+    say(&table(&[
+        row("samples", args.source.display().to_string()),
+        row("samples used", file.partial.readings().to_string()),
+        row("written to", path.display().to_string()),
+    ]))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
+    if args.x_mm.is_some() || args.y_mm.is_some() || args.theta_max_deg.is_some() {
+        return Err(Failure::with_help(
+            "--x-mm, --y-mm, --theta-max-deg: a run's plan says what it stands for",
+            "leave them out; they are for a CSV",
+        ));
+    }
+    let (setup, _, readings) = read_run(&args.source)?;
+    let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
+    let spec = FitSpec {
+        angular_degree: args.angular_degree.unwrap_or(setup.plan.fit.angular_degree),
+        position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
+    };
+    let (region, optics) = (fit_region(&setup), optics(&setup));
+    let input = calibrated.fit_input();
+    let partial = Partial::of(&input.samples, &region, basis(spec), &input.common, optics.as_ref())
+        .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
+    let flagged = calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count();
+    Ok(PartialFile {
+        partial,
+        quantity: setup.rig.detector.quantity,
+        optics,
+        simulated: setup.rig.is_simulated(),
+        n_flagged: flagged as u64,
+        n_excluded: (calibrated.samples.len() - input.samples.len()) as u64,
+    })
+}
+
+/// A CSV, read in blocks: memory doesn't grow with its length.
+struct Share<'a> {
+    region: Region,
+    basis: BasisSpec,
+    optics: Option<&'a Optics>,
+    begun: Option<(Accumulator, Quantity)>,
+    n_flagged: u64,
+    n_excluded: u64,
+}
+
+fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
+    let shown = args.source.display();
+    let (Some(x_mm), Some(y_mm), Some(theta_max_deg)) = (args.x_mm, args.y_mm, args.theta_max_deg)
+    else {
+        return Err(Failure::with_help("--partial of a CSV: no region", REGION_HELP));
+    };
+    let metres = |(from, to): (f64, f64)| (from * 1e-3, to * 1e-3);
+    let optics = args.rig.as_deref().map(optics_of).transpose()?;
+    let mut share = Share {
+        region: Region {
+            x_m: metres(x_mm),
+            y_m: metres(y_mm),
+            theta_max_rad: theta_max_deg.to_radians(),
+        },
+        basis: BasisSpec::zernike(
+            args.angular_degree.unwrap_or(ANGULAR_DEGREE),
+            args.position_degree.unwrap_or(POSITION_DEGREE),
+        ),
+        optics: optics.as_ref(),
+        begun: None,
+        n_flagged: 0,
+        n_excluded: 0,
+    };
+    let file = File::open(&args.source).map_err(|error| {
+        Failure::with_help(format!("{shown}: cannot be read: {error}"), CSV_HELP)
+    })?;
+    read_sample_blocks(BufReader::new(file), |block| share.take(&block)).map_err(|error| {
+        let help = if matches!(error, BlockError::Taken(_)) { REGION_HELP } else { CSV_HELP };
+        Failure::with_help(format!("{shown}: {error}"), help)
+    })?;
+    let (accumulator, quantity) =
+        share.begun.ok_or_else(|| Failure::with_help(format!("{shown}: no samples"), CSV_HELP))?;
+    Ok(PartialFile {
+        partial: accumulator.finish(),
+        quantity,
+        optics,
+        simulated: false,
+        n_flagged: share.n_flagged,
+        n_excluded: share.n_excluded,
+    })
+}
+
+impl Share<'_> {
+    fn take(&mut self, block: &InputSamples) -> Result<(), String> {
+        if self.begun.is_none() {
+            let weighting = if block.has_u() { Weighting::Stated } else { Weighting::Alike };
+            let begun = Accumulator::new(self.region, self.basis, self.optics.copied(), weighting);
+            self.begun = Some((begun.map_err(|error| error.to_string())?, block.quantity));
+        }
+        let Some((accumulator, _)) = &mut self.begun else { return Ok(()) };
+        let (samples, lines) = block.fit_samples_with_lines();
+        self.n_flagged += block.flagged() as u64;
+        self.n_excluded += (block.samples.len() - samples.len()) as u64;
+        accumulator.absorb(&samples).map_err(|error| match error.index() {
+            Some(index) => format!("line {}: {error}", lines[index]),
+            None => error.to_string(),
+        })
+    }
+}
+
+/// Merges shares and shows the fit of all.
+pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
+    let mut paths = std::iter::once(&args.source).chain(&args.further);
+    let Some(first_path) = paths.next() else { return Ok(ExitCode::SUCCESS) };
+    let first = read(first_path)?;
+    let mut whole = first.partial.clone();
+    let mut count = 1_usize;
+    let (mut n_flagged, mut n_excluded) = (first.n_flagged, first.n_excluded);
+    let mut simulated = first.simulated;
+    for path in paths {
+        let part = read(path)?;
+        let refused =
+            |why: String| Failure::with_help(format!("{}: {why}", path.display()), PARTIAL_HELP);
+        first
+            .check(&part)
+            .map_err(|differ| refused(format!("{differ} ({})", first_path.display())))?;
+        whole.merge(&part.partial).map_err(|error| refused(error.to_string()))?;
+        n_flagged += part.n_flagged;
+        n_excluded += part.n_excluded;
+        simulated |= part.simulated;
+        count += 1;
+    }
+    let closed = whole
+        .close(args.u_relative)
+        .map_err(|error| Failure::with_help(format!("merged: {error}"), FIT_HELP))?;
+    let mut notes = vec![format!("merged from {count} partial fits")];
+    if closed.u_factor > 1.0 {
+        notes.push(format!(
+            "the samples scatter beyond their stated uncertainties, which were all multiplied by \
+             {:.3}; a fit of all samples together weighs them anew",
+            closed.u_factor
+        ));
+    }
+    let file = FitFile {
+        fit: &closed.fit,
+        quantity: first.quantity,
+        simulated,
+        n_flagged: usize::try_from(n_flagged).unwrap_or(usize::MAX),
+        n_excluded: usize::try_from(n_excluded).unwrap_or(usize::MAX),
+        notes: &notes,
+        truth: None,
+    };
+    if let Some(path) = &args.output {
+        write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+    }
+    show(args, rays, &file, args.output.as_deref())
+}
+
+fn read(path: &Path) -> Result<ReadPartial, Failure> {
+    let refused = |why: &dyn std::fmt::Display| {
+        Failure::with_help(format!("{}: {why}", path.display()), PARTIAL_HELP)
+    };
+    let size = std::fs::metadata(path).map_err(|error| refused(&error))?.len();
+    if size > PARTIAL_BYTES_MAX {
+        let expected = format!("{size} bytes; expected at most {PARTIAL_BYTES_MAX}");
+        return Err(refused(&expected));
+    }
+    let bytes = std::fs::read(path).map_err(|error| refused(&error))?;
+    ReadPartial::read(&bytes).map_err(|error| refused(&error))
+}

@@ -1,0 +1,122 @@
+//! Shares of the readings, fitted apart and merged, as a script uses them.
+
+mod bench;
+
+use std::fmt::Write as _;
+
+use bench::Bench;
+use serde_json::Value;
+
+const REGION: [&str; 5] =
+    ["--x-mm=-5,5", "--y-mm=-5,5", "--theta-max-deg=80", "--angular-degree=4", "--partial"];
+
+/// Samples of a field that a degree of 4 holds, with scatter, from one number to another.
+fn samples(from: u32, to: u32, stated: bool) -> String {
+    let mut text = "x_mm,y_mm,theta_deg,phi_deg,radiance_w_per_m2_sr".to_owned();
+    text.push_str(if stated { ",u_radiance_w_per_m2_sr\n" } else { "\n" });
+    for i in from..to {
+        let part = |step: f64| (f64::from(i) * step + 0.37).fract();
+        let (x, y) = (10.0 * part(0.618_034) - 5.0, 10.0 * part(0.754_878) - 5.0);
+        let (theta, phi) = (80.0 * part(0.569_84), 360.0 * part(0.438_579) - 180.0);
+        let value = 60.0 - 20.0 * theta.to_radians().sin().powi(2) + part(0.233_7);
+        write!(text, "{x},{y},{theta},{phi},{value}").unwrap();
+        text.push_str(if stated { ",0.3\n" } else { "\n" });
+    }
+    text
+}
+
+fn bench() -> Bench {
+    let bench = Bench::empty();
+    for (name, stated) in [("", true), ("plain-", false)] {
+        for (share, from, to) in [("all", 0, 900), ("a", 0, 10), ("b", 10, 700), ("c", 700, 900)] {
+            std::fs::write(bench.path(&format!("{name}{share}.csv")), samples(from, to, stated))
+                .unwrap();
+        }
+    }
+    bench
+}
+
+fn part(bench: &Bench, share: &str) -> String {
+    let (csv, bin) = (format!("{share}.csv"), format!("{share}.bin"));
+    let arguments = [&["fit", &csv, "-o", &bin], &REGION[..]].concat();
+    bench.gonio(&arguments).well();
+    bin
+}
+
+fn assert_close(a: &Value, b: &Value, tolerance: f64) {
+    if let (Value::Array(a), Value::Array(b)) = (a, b) {
+        assert_eq!(a.len(), b.len());
+        a.iter().zip(b).for_each(|(a, b)| assert_close(a, b, tolerance));
+    } else {
+        let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+        assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{a} {b}");
+    }
+}
+
+#[test]
+fn merged_shares_of_a_csv_are_the_fit_of_the_whole() {
+    let bench = bench();
+    for name in ["", "plain-"] {
+        let parts = ["a", "b", "c"].map(|share| part(&bench, &format!("{name}{share}")));
+        let [a, b, c] = &parts;
+        let merged = bench.gonio(&["fit", "--merge", c, a, b, "-o", "fit.json", "--json"]);
+        let merged = merged.well().json();
+        assert_eq!(merged, bench.json("fit.json"));
+        assert_eq!(merged["notes"][0], "merged from 3 partial fits");
+        let all = part(&bench, &format!("{name}all"));
+        let all = bench.gonio(&["fit", "--merge", &all, "--json"]).well().json();
+        let whole = format!("{name}all.csv");
+        let whole = bench.gonio(&["fit", &whole, "--angular-degree", "4", "--json"]);
+        let whole = whole.well().json();
+        for key in ["coefficients", "covariance", "condition", "chi2", "residual_rms"] {
+            assert_close(&merged[key], &all[key], 1e-9);
+        }
+        // Without a region a CSV stands for where its samples lie, a little less than asked for
+        // here; with constant position terms that is of no account to the field.
+        for key in ["coefficients", "covariance", "chi2", "residual_rms", "n_used", "dof"] {
+            assert_close(&merged[key], &whole[key], 1e-6);
+        }
+    }
+}
+
+#[test]
+fn a_run_is_a_share_too() {
+    let bench = Bench::small();
+    bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
+    bench.gonio(&["fit", "out", "--partial", "-o", "out.bin"]).well();
+    let merged = bench.gonio(&["fit", "--merge", "out.bin", "--json"]).well().json();
+    let whole = bench.json("out/fit.json");
+    assert_eq!(merged["region"], whole["region"]);
+    for key in ["coefficients", "covariance", "n_used", "dof", "n_flagged", "n_excluded"] {
+        assert_close(&merged[key], &whole[key], 1e-6);
+    }
+}
+
+#[test]
+fn what_cannot_be_merged_is_refused_and_says_why() {
+    let bench = bench();
+    let a = part(&bench, "a");
+    let b = part(&bench, "plain-b");
+    let merge = |other: &str| bench.gonio(&["fit", "--merge", &a, other, "-o", "no.json"]);
+    merge(&b).refused(&["plain-b.bin: weights: ", "expected \"by the stated", "(a.bin)"]);
+    let other = [&["fit", "c.csv", "-o", "c.bin"], &REGION[..2], &["--theta-max-deg=85"]];
+    let other = [other.concat(), REGION[3..].to_vec()].concat();
+    bench.gonio(&other).well();
+    merge("c.bin").refused(&["c.bin: region: ", "expected {", "(a.bin)", "help: "]);
+    let degree = [&["fit", "c.csv", "-o", "c.bin", "--partial"], &REGION[..3]].concat();
+    bench.gonio(&degree).well();
+    merge("c.bin").refused(&["c.bin: basis: ", "\"degree\":6", "\"degree\":4"]);
+    merge("c.csv").refused(&["c.csv: no partial fit", "help: give files that"]);
+    merge("gone.bin").refused(&["gone.bin: "]);
+    let mut bytes = std::fs::read(bench.path(&a)).unwrap();
+    bytes.truncate(bytes.len() - 100);
+    std::fs::write(bench.path("cut.bin"), bytes).unwrap();
+    merge("cut.bin").refused(&["cut.bin: ", "cut short"]);
+    assert!(!bench.path("no.json").exists());
+    // Ten readings do not tell fifteen coefficients.
+    bench.gonio(&["fit", "--merge", &a]).refused(&["10 readings are fewer than the 15"]);
+    bench.gonio(&["fit", "a.csv", "--partial", "-o", "x.bin"]).refused(&["no region", "--x-mm"]);
+    let narrow = [&["fit", "b.csv", "-o", "x.bin", "--x-mm=-1,1"], &REGION[1..]].concat();
+    bench.gonio(&narrow).refused(&["b.csv: line 3: ", "outside the region"]);
+    assert!(!bench.path("x.bin").exists());
+}
