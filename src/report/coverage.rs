@@ -45,6 +45,11 @@ impl Coverage {
         theta_rad <= self.theta_max_rad && self.units.iter().any(|u| dot(u, &unit) >= cos_reach)
     }
 
+    /// The directions, each once: unit vectors.
+    pub(super) fn units(&self) -> &[[f64; 3]] {
+        &self.units
+    }
+
     /// Beyond this angle nothing was measured, radians; at most π/2.
     pub(super) fn theta_max_rad(&self) -> f64 {
         self.theta_max_rad

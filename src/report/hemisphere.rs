@@ -19,7 +19,7 @@ const PANEL: f64 = 480.0;
 const HATCH: &str = "url(#hemisphere-hatch)";
 const CENTRE: (f64, f64) = (195.0, 205.0);
 const HEIGHT: f64 = 390.0;
-/// Readings whose directions are drawn, at most.
+/// Directions that are drawn, at most.
 const MARKS_MAX: usize = 800;
 
 /// What is drawn over the hemisphere.
@@ -69,7 +69,7 @@ impl Hemisphere<'_> {
             panel.frame(&mut svg, &headings[i], "over");
             raster::bar(&mut svg, panel.beside(), 2.0 * RADIUS, ends[i], self.unit);
         }
-        let drawn = self.read(&mut svg, &Panel::new(3, limit), &values);
+        let drawn = Self::read(&mut svg, &Panel::new(3, limit), &values, &coverage);
         let has_gaps = values.iter().any(|value| value.is_some_and(f64::is_nan));
         let has_gaps = has_gaps || limit < core::f64::consts::FRAC_PI_2;
         let gap = has_gaps.then(|| (coverage.reach_rad(), self.unmeasured_share(&coverage)));
@@ -122,14 +122,14 @@ impl Hemisphere<'_> {
     }
 
     /// Where readings were taken; how many of them are drawn.
-    fn read(&self, svg: &mut Svg, panel: &Panel, values: &[Option<f64>]) -> usize {
+    fn read(svg: &mut Svg, panel: &Panel, values: &[Option<f64>], coverage: &Coverage) -> usize {
         let gaps: Cells = values.iter().map(|value| value.filter(|v| v.is_nan())).collect();
         panel.map(svg, &gaps, (0.0, 1.0));
         panel.frame(svg, "directions read", "grid");
-        let stride = self.directions.len().div_ceil(MARKS_MAX).max(1);
-        let shown = self.directions.iter().step_by(stride);
-        let points = shown.clone().map(|&(theta, phi)| {
-            let (x, y) = on_disk(theta, phi);
+        let stride = coverage.units().len().div_ceil(MARKS_MAX).max(1);
+        let shown = coverage.units().iter().step_by(stride);
+        let points = shown.clone().map(|&[x, y, z]| {
+            let (x, y) = on_disk(libm::acos(z.clamp(-1.0, 1.0)), libm::atan2(y, x));
             (panel.centre.0 + RADIUS * x, panel.centre.1 - RADIUS * y)
         });
         let attributes =
@@ -146,7 +146,7 @@ impl Hemisphere<'_> {
         )];
         let all = self.directions.len();
         if drawn < all {
-            said.push(format!("{drawn} of {all} directions are drawn."));
+            said.push(format!("{drawn} dots stand for the directions of {all} readings."));
         }
         if let Some((reach, share)) = gap {
             said.push(format!(

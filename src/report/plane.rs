@@ -1,5 +1,7 @@
 //! A field over the sample's plane in one direction, as a map of x and y.
 
+use std::collections::BTreeMap;
+
 use super::raster::{self, Frame};
 use super::svg::{Anchor, Picture, Svg, marks};
 use super::ticks::Ticks;
@@ -71,7 +73,8 @@ impl Plane<'_> {
         let drawn = self.marks(&mut svg, (width, height));
         raster::bar(&mut svg, (LEFT + width + 30.0, TOP), height, ends, self.unit);
         let all = self.positions.len();
-        let thinned = if drawn < all { format!(" ({drawn} of {all})") } else { String::new() };
+        let thinned =
+            if drawn < all { format!(", {drawn} for {all} readings") } else { String::new() };
         let (low, high) = raster::ends(values.iter().copied(), 0.0);
         let is_flat = values.iter().all(|value| value.to_bits() == values[0].to_bits())
             || high - low <= 1e-12 * high.abs();
@@ -103,14 +106,17 @@ impl Plane<'_> {
     }
 
     fn marks(&self, svg: &mut Svg, (width, height): (f64, f64)) -> usize {
-        let stride = self.positions.len().div_ceil(MARKS_MAX).max(1);
         let part = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
-        let shown: Vec<(f64, f64)> = self
-            .positions
-            .iter()
-            .step_by(stride)
-            .map(|&(x, y)| (part(x, self.x_mm), part(y, self.y_mm)))
-            .collect();
+        // One for each hundredth of a side.
+        let mut places: BTreeMap<(i64, i64), (f64, f64)> = BTreeMap::new();
+        for &(x, y) in self.positions {
+            let (x, y) = (part(x, self.x_mm), part(y, self.y_mm));
+            #[allow(clippy::cast_possible_truncation)] // saturates
+            let place = |t: f64| libm::round(100.0 * t) as i64;
+            places.entry((place(x), place(y))).or_insert((x, y));
+        }
+        let stride = places.len().div_ceil(MARKS_MAX).max(1);
+        let shown: Vec<(f64, f64)> = places.into_values().step_by(stride).collect();
         let is_inside = |t: f64| (-0.03..=1.03).contains(&t);
         let inside = shown.iter().filter(|(x, y)| is_inside(*x) && is_inside(*y));
         let d = marks(inside.map(|(x, y)| (LEFT + width * x, TOP + height * (1.0 - y))));
