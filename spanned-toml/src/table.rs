@@ -265,7 +265,8 @@ impl<'d> Table<'d> {
         Ok(Table::new(self.source, self.dotted(name), value.span.clone(), entries))
     }
 
-    fn missing(&self, key: &str, expected: &str) -> Problem {
+    /// That `key` isn't there: at its misspelling where there is one, else at this table.
+    pub fn missing(&self, key: &str, expected: &str) -> Problem {
         if let Some(entry) = self.misspelt(key) {
             let expected = format!("`{key}`, {expected}");
             let (found, span) = (self.dotted(&shown(&entry.key)), entry.key_span.clone());
@@ -290,12 +291,18 @@ impl<'d> Table<'d> {
 
     /// The key, not asked for so far, that is likely to be `key` misspelt. It may yet be asked
     /// for, so the two must differ in one word alone (`_` parts words), and that little; or in
-    /// the unit, the last word. So `y_mm` is not taken for `x_mm`.
+    /// the unit, the last word, or lack the unit. So `y_mm` is not taken for `x_mm`.
     fn misspelt(&self, key: &str) -> Option<&'d Entry> {
         let asked = self.asked.borrow();
         let words: Vec<&str> = key.split('_').collect();
         self.entries.iter().filter(|entry| !asked.contains(&entry.key)).find(|entry| {
             let found: Vec<&str> = entry.key.split('_').collect();
+            if let Some((unit, rest)) = words.split_last()
+                && UNITS.contains(unit)
+                && rest == found
+            {
+                return true;
+            }
             if found.len() != words.len() {
                 return false;
             }
@@ -423,6 +430,7 @@ mod tests {
             ("[region]\ntheta_mx_deg = 80", "theta_max_deg"),
             ("[region]\ntheta_max_rad = 80", "theta_max_deg"),
             ("[region]\ndwel_ms = 80", "dwell_ms"),
+            ("[region]\ntheta_max = 80", "theta_max_deg"),
         ] {
             let document = document(text);
             let region = document.root().required_table("region").unwrap();

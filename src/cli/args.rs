@@ -213,6 +213,12 @@ pub(crate) struct FitArgs {
     /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg).
     #[arg(long, value_name = "FILE")]
     pub(crate) at: Option<PathBuf>,
+    /// Derive a quantity with its uncertainty: "KIND KEY=VALUE ..." or a .toml file of [[derive]]
+    /// tables; may be given several times. Kinds: radiance, exitance, intensity, peak_intensity,
+    /// centre_beam_intensity, flux, irradiance, beam_angle, field_angle, environment, two_plane.
+    /// Example: --derive "irradiance at_mm=0,0,500 normal=0,0,-1"
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) derive: Vec<String>,
     /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all. Of
     /// partial fits --merge takes it.
     #[arg(long, value_name = "U")]

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use fit::{BasisSpec, Optics, Region};
 
 use super::args::FitArgs;
+use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
 use super::output::{note, say, write_out};
@@ -18,7 +19,7 @@ use super::text::{row, table};
 use crate::export::{
     FitFile, InputSamples, RayColumns, read_rays, read_samples, write_at, write_atomically,
 };
-use crate::plan::FitSpec;
+use crate::plan::{FitSpec, Wanted};
 
 /// The degrees for a CSV, where the command line does not say.
 pub(super) const ANGULAR_DEGREE: usize = 6;
@@ -35,13 +36,18 @@ const CSV_BYTES_MAX: u64 = 2 << 30;
 /// Fits again and prints what came out.
 pub(crate) fn fit(args: &FitArgs) -> Outcome {
     let rays = args.at.as_deref().map(rays_at).transpose()?;
+    let wanted = derive::wanted(&args.derive)?;
     if args.merge {
-        return partial::merge(args, rays);
+        return partial::merge(args, rays, &wanted);
     }
     if args.partial {
+        if !wanted.is_empty() {
+            let what = "--derive: a share of the readings is no fit yet";
+            return Err(Failure::with_help(what, "give it to --merge"));
+        }
         return partial::partial(args);
     }
-    if args.source.is_dir() { fit_run(args, rays) } else { fit_csv(args, rays) }
+    if args.source.is_dir() { fit_run(args, rays, &wanted) } else { fit_csv(args, rays, &wanted) }
 }
 
 /// The rays at which the fit shall be evaluated.
@@ -51,7 +57,7 @@ fn rays_at(path: &Path) -> Result<Vec<RayColumns>, Failure> {
         .map_err(|error| Failure::with_help(format!("{}: {error}", path.display()), help))
 }
 
-fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
+fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
     if args.u_relative.is_some() {
         return Err(Failure::with_help(
             "--u-relative: a run's samples have uncertainties of their own",
@@ -64,7 +70,8 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
             "leave it out; it is for a CSV, which has none",
         ));
     }
-    let (setup, _, readings) = read_run(&args.source)?;
+    let (mut setup, _, readings) = read_run(&args.source)?;
+    setup.plan.derive.extend_from_slice(wanted);
     let spec = FitSpec {
         angular_degree: args.angular_degree.unwrap_or(setup.plan.fit.angular_degree),
         position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
@@ -76,6 +83,7 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
     let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
     results.write_fit(&path, &setup, fitted).map_err(Failure::midway)?;
+    derive::write_tables(beside(&path), &results.derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &fitted.fit,
         quantity: setup.rig.detector.quantity,
@@ -84,11 +92,12 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         n_excluded: fitted.n_excluded,
         notes: &[],
         truth: results.truth,
+        derived: &results.derived,
     };
     show(args, rays, &file, Some(&path))
 }
 
-fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
+fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
     let shown = args.source.display();
     let bytes = read_csv(&args.source)?;
     let input = read_samples(&bytes)
@@ -108,6 +117,9 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
     let fit = fit::fit_seen(&samples, &region, basis, &[], optics.as_ref())
         .map_err(|error| Failure::with_help(format!("{shown}: {error}"), FIT_HELP))?;
     let notes = [note_on_u(&input, args.u_relative)];
+    let derived = derive::derive(&fit, input.quantity, wanted);
+    let folder = args.output.as_deref().map_or(Path::new(""), beside);
+    derive::write_tables(folder, &derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &fit,
         quantity: input.quantity,
@@ -116,6 +128,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         n_excluded: input.samples.len() - samples.len(),
         notes: &notes,
         truth: None,
+        derived: &derived,
     };
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
@@ -192,7 +205,19 @@ pub(super) fn show(
     } else {
         say(&summary(args, file, written))?;
     }
-    Ok(ExitCode::SUCCESS)
+    let mut is_whole = true;
+    for quantity in file.derived {
+        if let Err(why) = &quantity.outcome {
+            is_whole = false;
+            note(&format!("{}, {}: {why}", quantity.name, quantity.asked));
+        }
+    }
+    Ok(if is_whole { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The folder of a file; that of a bare name is the current one.
+pub(super) fn beside(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
 }
 
 /// The fit's functions go on beyond what was measured, and say so in their u only in part.
@@ -220,6 +245,7 @@ fn summary(args: &FitArgs, file: &FitFile<'_>, written: Option<&Path>) -> String
         row("condition", format!("{:.1}", fit.condition())),
     ];
     rows.extend(field_rows(fit, file.quantity));
+    rows.extend(derive::rows(file.derived, file.quantity));
     rows.extend(file.notes.iter().map(|note| row("note", note)));
     rows.extend(written.map(|path| row("written to", path.display().to_string())));
     table(&rows)

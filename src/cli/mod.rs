@@ -6,6 +6,7 @@ mod args;
 pub mod calc;
 mod client;
 mod daemon;
+mod derive;
 mod explain;
 mod export;
 mod failure;

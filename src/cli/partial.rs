@@ -10,8 +10,9 @@ use fit::partial::{Accumulator, Partial, Weighting};
 use fit::{BasisSpec, Optics, Region};
 
 use super::args::FitArgs;
+use super::derive;
 use super::failure::{Failure, Outcome};
-use super::fit::{ANGULAR_DEGREE, CSV_HELP, FIT_HELP, POSITION_DEGREE, optics_of, show};
+use super::fit::{ANGULAR_DEGREE, CSV_HELP, FIT_HELP, POSITION_DEGREE, beside, optics_of, show};
 use super::output::say;
 use super::results::{basis, fit_region, optics, read_run};
 use super::text::{row, table};
@@ -19,7 +20,7 @@ use crate::export::{
     BlockError, FitFile, InputSamples, PartialFile, RayColumns, ReadPartial, read_sample_blocks,
     write_atomically,
 };
-use crate::plan::FitSpec;
+use crate::plan::{FitSpec, Wanted};
 use crate::rig::Quantity;
 use crate::rig::calibration::calibrate;
 
@@ -150,7 +151,7 @@ impl Share<'_> {
 }
 
 /// Merges shares and shows the fit of all.
-pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
+pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
     let mut paths = std::iter::once(&args.source).chain(&args.further);
     let Some(first_path) = paths.next() else { return Ok(ExitCode::SUCCESS) };
     let first = read(first_path)?;
@@ -182,6 +183,9 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
             closed.u_factor
         ));
     }
+    let derived = derive::derive(&closed.fit, first.quantity, wanted);
+    let folder = args.output.as_deref().map_or(Path::new(""), beside);
+    derive::write_tables(folder, &derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &closed.fit,
         quantity: first.quantity,
@@ -190,6 +194,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>) -> Outcome {
         n_excluded: usize::try_from(n_excluded).unwrap_or(usize::MAX),
         notes: &notes,
         truth: None,
+        derived: &derived,
     };
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;

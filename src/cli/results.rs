@@ -6,13 +6,14 @@ use std::path::Path;
 
 use fit::{BasisSpec, FitError, Optics, Region};
 
+use super::derive::{derive, write_tables};
 use super::failure::Failure;
 use super::folder::JOURNAL;
 use super::report::{self, REPORT, RunRecord};
 use super::setup::Setup;
 use crate::export::{
-    AccuracyPoint, ExportError, FitFile, SamplesMeta, TruePeak, Truth, write_accuracy,
-    write_atomically, write_readings, write_samples,
+    AccuracyPoint, DerivedQuantity, ExportError, FitFile, SamplesMeta, TruePeak, Truth,
+    write_accuracy, write_atomically, write_readings, write_samples,
 };
 use crate::journal::{Header, InputRole, Order, Reader};
 use crate::plan::FitSpec;
@@ -38,6 +39,8 @@ pub(crate) struct Results {
     pub(crate) accuracy: Vec<AccuracyPoint>,
     /// What the fit gives each sample's reading, in the samples' order; empty without a fit.
     pub(crate) levels: Vec<f64>,
+    /// What the plan asks to be derived from the fit.
+    pub(crate) derived: Vec<DerivedQuantity>,
 }
 
 impl Results {
@@ -57,7 +60,11 @@ impl Results {
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
         let accuracy = accuracy(&calibrated, &region, basis, optics.as_ref());
-        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy, levels })
+        let derived = fitted.as_ref().map_or_else(
+            |_| Vec::new(),
+            |fitted| derive(&fitted.fit, setup.rig.detector.quantity, &setup.plan.derive),
+        );
+        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy, levels, derived })
     }
 
     /// Samples that carry a flag.
@@ -95,6 +102,7 @@ impl Results {
         })?;
         if let Ok(fitted) = &self.fitted {
             self.write_fit(&folder.join("fit.json"), setup, fitted)?;
+            write_tables(folder, &self.derived)?;
         }
         let report = report::of(setup, self, record);
         write_atomically(&folder.join(REPORT), |out| report.write(out))
@@ -137,6 +145,7 @@ impl Results {
             n_excluded: fitted.n_excluded,
             notes: &[],
             truth: self.truth,
+            derived: &self.derived,
         };
         write_atomically(path, |out| file.write(out))
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use fit::{BeamRows, Fit};
 use serde_json::{Value, json};
 
+use super::derive;
 use super::report::REPORT;
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
@@ -82,6 +83,7 @@ impl Summary<'_> {
                 rows.push(row("error of radiance", format!("{rms} RMS over the region")));
             }
         }
+        rows.extend(derive::rows(&self.results.derived, self.setup.rig.detector.quantity));
         rows
     }
 

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use fit::{Angular, BeamRows, Estimate, Fit, Position};
 use serde_json::{Map, Value, json};
 
+use super::DerivedQuantity;
 use crate::rig::Quantity;
 
 /// What fit.json says. Numbers that do not exist are `null`.
@@ -24,6 +25,8 @@ pub struct FitFile<'a> {
     pub notes: &'a [String],
     /// What is true, on a simulated rig.
     pub truth: Option<Truth>,
+    /// What was derived from the fit beyond what is always there.
+    pub derived: &'a [DerivedQuantity],
 }
 
 /// What leaves a simulated sample, by the definitions of the fit's own quantities.
@@ -102,6 +105,8 @@ impl FitFile<'_> {
         put("notes", json!(self.notes));
         put("uncertainty_budget_exitance", self.budget());
         self.put_derived(&mut object);
+        let derived = self.derived.iter().map(|quantity| quantity.json(self.quantity));
+        object.insert("derived".to_owned(), derived.collect());
         if let Some(truth) = self.truth {
             object.insert("truth".to_owned(), self.truth(truth));
             object.insert(
@@ -268,6 +273,7 @@ mod tests {
             n_excluded: 1,
             notes: &notes,
             truth: Some(truth),
+            derived: &[],
         };
         let json = written(&file);
         let number = |path: &str| json.pointer(path).and_then(Value::as_f64).expect(path);
@@ -311,6 +317,7 @@ mod tests {
                 n_excluded: 0,
                 notes: &[],
                 truth: None,
+                derived: &[],
             };
             let json = written(&file);
             let object = json.as_object().unwrap();

@@ -8,6 +8,7 @@
 
 mod accuracy;
 mod atomic;
+mod derived;
 mod fit_file;
 mod frontier;
 mod input;
@@ -22,6 +23,7 @@ mod tests;
 
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
+pub use derived::{DerivedKind, DerivedOutcome, DerivedQuantity, DerivedTable};
 pub use fit_file::{FitFile, TruePeak, Truth};
 pub use frontier::write_frontier;
 pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};

@@ -10,7 +10,8 @@ use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
-    Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, WarmUp,
+    Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted,
+    WarmUp,
 };
 use crate::rig::Pose;
 
@@ -49,7 +50,7 @@ impl Plan {
     /// At the top: `name`, what to call its runs · `rig`, a rig file beside the plan or
     /// `"simulated"` · `scene`, a scene file beside the plan. Then the tables `[region]`,
     /// `[schedule]`, `[dwell]`, `[dark]`, `[fit]`, and if wanted `[sample]`, `[reference]`,
-    /// `[warm_up]` and `[stop]`.
+    /// `[warm_up]` and `[stop]`, and any number of `[[derive]]`.
     pub fn read(document: Document) -> Result<Self, Problem> {
         let root = document.root();
         let text = |key: &str| root.text(key).map(|text| text.map(str::to_owned));
@@ -63,6 +64,7 @@ impl Plan {
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
         let fit = read_fit(root.required_table("fit")?)?;
+        let derive = Wanted::read_all(&root)?;
         root.finish()?;
         Ok(Self {
             name,
@@ -80,6 +82,7 @@ impl Plan {
             warm_up,
             stop,
             fit,
+            derive,
             document,
         })
     }

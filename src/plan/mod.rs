@@ -21,6 +21,7 @@ mod order;
 mod sequence;
 mod terms;
 mod tree;
+mod wanted;
 
 pub use cost::{Prediction, StepTime, TimeLeft};
 pub use hash::PlanHash;
@@ -28,6 +29,7 @@ pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Target, WARM_UP_IDS_FROM, cl
 pub use terms::{
     Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, WarmUp,
 };
+pub use wanted::{Asked, Wanted};
 
 /// The most targets that a plan may have. At a second each they take twelve days.
 pub const TARGETS_MAX: u32 = 1_000_000;

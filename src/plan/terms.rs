@@ -7,6 +7,7 @@ use std::time::Duration;
 use fit::Outline;
 use spanned_toml::Document;
 
+use super::Wanted;
 use crate::rig::Pose;
 
 /// A plan as its file states it.
@@ -42,6 +43,8 @@ pub struct Plan {
     pub stop: Stop,
     /// `[fit]`.
     pub fit: FitSpec,
+    /// `[[derive]]`: what shall be derived from the fit.
+    pub derive: Vec<Wanted>,
     pub(super) document: Document,
 }
 

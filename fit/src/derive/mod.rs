@@ -116,6 +116,12 @@ impl<'f> Field<'f> {
 }
 
 impl Derived {
+    /// An angle's radians as degrees.
+    #[must_use]
+    pub fn in_degrees(self) -> Self {
+        self.times(1f64.to_degrees())
+    }
+
     /// Times a factor, not negative, without uncertainty.
     fn times(mut self, factor: f64) -> Self {
         self.estimate = self.estimate.times(factor);

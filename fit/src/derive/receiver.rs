@@ -79,11 +79,13 @@ impl Receiver {
         self.lowest_m
     }
 
-    pub(super) fn place_m(&self) -> DVec3 {
+    /// A point of it: its centre, or a polygon's first vertex.
+    pub fn place_m(&self) -> DVec3 {
         self.place_m
     }
 
-    pub(super) fn normal(&self) -> DVec3 {
+    /// Unit vector into the half-space that light arrives from.
+    pub fn normal(&self) -> DVec3 {
         self.normal
     }
 
