@@ -4,6 +4,7 @@ mod bench;
 
 use bench::Bench;
 use std::f64::consts::PI;
+use std::fmt::Write as _;
 
 /// A lawn of samples of a Lambertian field of 100, over 20 mm by 20 mm.
 fn samples(column: &str, u: &str) -> String {
@@ -13,9 +14,9 @@ fn samples(column: &str, u: &str) -> String {
     for place in 0..9 {
         let (x, y) = (f64::from(place % 3) * 10.0 - 10.0, f64::from(place / 3) * 10.0 - 10.0);
         for ring in 0..8 {
-            for spoke in 0..8 {
-                let (theta, phi) = (f64::from(ring) * 10.0, f64::from(spoke) * 45.0);
-                text.push_str(&format!("{x},{y},{theta},{phi},100{u}\n"));
+            for spoke in 0..14 {
+                let (theta, phi) = (f64::from(ring) * 10.0, f64::from(spoke) * 360.0 / 14.0);
+                writeln!(text, "{x},{y},{theta},{phi},100{u}").unwrap();
             }
         }
     }
@@ -49,7 +50,9 @@ fn a_lambertian_field_has_its_closed_forms() {
         "radiance x_mm=0 y_mm=0 theta_deg=30 phi_deg=0 window.index=1.5 window.thickness_mm=1",
     ];
     let mut arguments = vec!["fit", "s.csv", "--json", "-o", "fit.json"];
-    specs.iter().for_each(|spec| arguments.extend(["--derive", spec]));
+    for spec in specs {
+        arguments.extend(["--derive", spec]);
+    }
     let bench = bench();
     let said = bench.gonio(&arguments).well();
     let fit = said.json();

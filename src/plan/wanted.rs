@@ -281,19 +281,15 @@ fn required_vector(table: &Table<'_>, key: &str, bounds: Bounds) -> Result<DVec3
 /// `vertices_mm`, a polygon; or `at_mm` and `normal`, a point; with `radius_mm` a disk.
 fn read_receiver(table: &Table<'_>) -> Result<Receiver, Problem> {
     let vertices = table.points("vertices_mm", LENGTH_MM, 3..=VERTICES_MAX, 3..=3)?;
-    let (key, receiver) = match vertices {
-        Some(vertices) => {
-            let vertices = vertices.iter().map(|v| DVec3::new(v[0], v[1], v[2]) / 1e3).collect();
-            ("vertices_mm", Receiver::polygon(vertices))
-        }
-        None => {
-            let at_m = required_vector(table, "at_mm", LENGTH_MM)? / 1e3;
-            let normal = required_vector(table, "normal", COMPONENT)?;
-            match table.number("radius_mm", SIZE_MM)? {
-                Some(radius_mm) => ("at_mm", Receiver::disk(at_m, normal, radius_mm / 1e3)),
-                None => ("at_mm", Receiver::point(at_m, normal)),
-            }
-        }
+    let (key, receiver) = if let Some(vertices) = vertices {
+        let vertices = vertices.iter().map(|v| DVec3::new(v[0], v[1], v[2]) / 1e3).collect();
+        ("vertices_mm", Receiver::polygon(vertices))
+    } else {
+        let at_m = required_vector(table, "at_mm", LENGTH_MM)? / 1e3;
+        let normal = required_vector(table, "normal", COMPONENT)?;
+        let radius_mm = table.number("radius_mm", SIZE_MM)?;
+        let point = || Receiver::point(at_m, normal);
+        ("at_mm", radius_mm.map_or_else(point, |mm| Receiver::disk(at_m, normal, mm / 1e3)))
     };
     receiver.map_err(|error| {
         let expected = "a flat receiver, all of it above the sample's plane z = 0";

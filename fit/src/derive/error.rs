@@ -81,7 +81,8 @@ impl fmt::Display for DeriveError {
                 f,
                 "the receiver's lowest point has z = {} mm; expected all of it above the sample's \
                  plane z = 0",
-                height_m * 1e3
+                // To a picometre: what lies below it is rounding.
+                (height_m * 1e12).round() / 1e9
             ),
             Self::TooNear { height_m } => write!(
                 f,

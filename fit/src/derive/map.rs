@@ -3,10 +3,10 @@
 
 use super::sum::{Node, is_measured};
 use super::{DeriveError, Field};
-use crate::{Estimate, Ray};
+use crate::{Estimate, Ray, Region};
 use glam::DVec3;
 use radiometry::chart::{Surface, TwoPlane};
-use radiometry::direction::{angles, frame, normalised, unit};
+use radiometry::direction::{angle_between, angles, frame, normalised, unit};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// How the hemisphere before a point is cut into cells.
@@ -99,17 +99,19 @@ impl Field<'_> {
             return Err(DeriveError::BelowPlane { height_m: map.place_m.z });
         }
         check_count("cells", map.rows.saturating_mul(map.columns))?;
+        self.area_m2()?;
+        let sight = Sight::of(self.fit.region(), map.place_m);
         let cells = (0..map.rows * map.columns)
-            .map(|k| self.cell(map, normal, k / map.columns, k % map.columns));
+            .map(|k| self.cell(map, &sight, normal, (k / map.columns, k % map.columns)));
         Ok(cells.collect())
     }
 
     fn cell(
         &self,
         map: &EnvironmentMap,
+        sight: &Sight,
         normal: DVec3,
-        row: usize,
-        column: usize,
+        (row, column): (usize, usize),
     ) -> EnvironmentCell {
         let (t, b) = frame(normal);
         let towards = |theta_rad: f64, phi_rad: f64| {
@@ -118,11 +120,16 @@ impl Field<'_> {
         };
         let (upper, lower) = map.cosines(row);
         let step_rad = TAU / map.columns as f64;
-        let part = 1.0 / (SUB * SUB) as f64;
-        let rays = (0..SUB * SUB).filter_map(|k| {
-            let (i, j) = ((k / SUB) as f64 + 0.5, (k % SUB) as f64 + 0.5);
-            let theta_rad = libm::acos(upper + (lower - upper) * i / SUB as f64);
-            let phi_rad = step_rad * (column as f64 + j / SUB as f64);
+        let (theta_rad, phi_rad) = (map.middle_rad(row), step_rad * (column as f64 + 0.5));
+        let corners = [(upper, 0.0), (upper, 1.0), (lower, 0.0), (lower, 1.0)];
+        let corners = corners
+            .map(|(cos, share)| towards(libm::acos(cos), step_rad * (column as f64 + share)));
+        let side = sight.rays_a_side(towards(theta_rad, phi_rad), &corners, map.columns);
+        let part = 1.0 / (side * side).max(1) as f64;
+        let rays = (0..side * side).filter_map(|k| {
+            let (i, j) = ((k / side) as f64 + 0.5, (k % side) as f64 + 0.5);
+            let theta_rad = libm::acos(upper + (lower - upper) * i / side as f64);
+            let phi_rad = step_rad * (column as f64 + j / side as f64);
             self.leaving(map.place_m, towards(theta_rad, phi_rad))
         });
         let rays: Vec<Ray> = rays.collect();
@@ -131,7 +138,6 @@ impl Field<'_> {
         };
         let known = rays.iter().filter(is_known).count();
         let terms: Vec<(Node, f64)> = rays.iter().map(|ray| (Node::Along(*ray), part)).collect();
-        let (theta_rad, phi_rad) = (map.middle_rad(row), step_rad * (column as f64 + 0.5));
         EnvironmentCell {
             theta_rad,
             phi_rad,
@@ -236,7 +242,59 @@ fn check_count(what: &'static str, count: usize) -> Result<(), DeriveError> {
     Err(DeriveError::Domain { what, value: count as f64, expected })
 }
 
-/// Rays a side of a cell.
-const SUB: usize = 4;
+/// The region as a point sees it.
+struct Sight {
+    /// Unit vector to its centre.
+    centre: DVec3,
+    /// From there to the farthest corner, radians.
+    half_angle_rad: f64,
+    /// Across its narrower side, radians.
+    narrow_rad: f64,
+}
+
+impl Sight {
+    fn of(region: &Region, place_m: DVec3) -> Self {
+        let ((x0, x1), (y0, y1)) = (region.x_m, region.y_m);
+        let to = |x: f64, y: f64| DVec3::new(x, y, 0.0) - place_m;
+        let across = to(f64::midpoint(x0, x1), f64::midpoint(y0, y1));
+        let distance_m = across.length();
+        let centre = across / distance_m;
+        let corners = [to(x0, y0), to(x1, y0), to(x1, y1), to(x0, y1)];
+        let half_angle_rad = corners.map(|corner| angle_between(corner, centre));
+        Self {
+            centre,
+            half_angle_rad: half_angle_rad.into_iter().fold(0.0, f64::max),
+            narrow_rad: (x1 - x0).min(y1 - y0) * centre.z.abs() / distance_m,
+        }
+    }
+
+    /// How many rays along each side of a cell: none where it doesn't meet the region, and so many
+    /// where it does that a narrow region isn't passed over.
+    fn rays_a_side(&self, middle: DVec3, corners: &[DVec3; 4], columns: usize) -> usize {
+        let radii = corners.map(|corner| angle_between(corner, middle));
+        let radius_rad = radii.into_iter().fold(0.0, f64::max);
+        let apart_rad = angle_between(middle, self.centre);
+        let is_compact = columns >= COLUMNS_COMPACT;
+        if is_compact && apart_rad > self.half_angle_rad + ROOM * radius_rad {
+            return 0;
+        }
+        let extent_rad = if is_compact { 2.0 * radius_rad } else { TAU };
+        let wanted = RAYS_ACROSS * extent_rad / self.narrow_rad.max(f64::MIN_POSITIVE);
+        // Between the two.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let side = wanted.ceil().clamp(SIDE_MIN, SIDE_MAX) as usize;
+        side
+    }
+}
+
+/// Rays a side of a cell at least, and at most.
+const SIDE_MIN: f64 = 4.0;
+const SIDE_MAX: f64 = 128.0;
+/// Rays across the region's narrower side.
+const RAYS_ACROSS: f64 = 8.0;
+/// With fewer columns a cell reaches farther than its corners.
+const COLUMNS_COMPACT: usize = 8;
+/// Room for a cell's edges, which bulge beyond its corners.
+const ROOM: f64 = 1.2;
 /// Cells or rays of one map.
 const COUNT_MAX: usize = 1_000_000;

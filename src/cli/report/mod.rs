@@ -2,6 +2,7 @@
 //! And `gonio report`, which renders it again from the journal.
 
 mod course;
+mod derived;
 mod facts;
 mod fields;
 mod flagged;
@@ -94,6 +95,7 @@ pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Re
                 items: facts::notes(setup, results),
                 ..Section::default()
             });
+            sections.extend(derived::section(setup, results));
             sections.push(fields::section(setup, results, fitted));
             sections.extend(fields::budget(setup, fitted));
             sections.extend(course::accuracy(setup, results));
