@@ -10,8 +10,6 @@
 mod chart;
 mod gather;
 mod mesh;
-#[cfg(test)]
-mod tests;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -396,3 +394,6 @@ impl Interreflection {
         member.map_or(0.0, value).max(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests;
