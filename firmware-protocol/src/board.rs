@@ -60,6 +60,17 @@ pub trait Board {
     fn begin_motion(&mut self, now: Instant, channel: u8, towards: f64) {
         let _ = (now, channel, towards);
     }
+    /// The axis has come to a constant speed, counts a second, signed, to which it accelerated
+    /// evenly within `ramp`. It keeps it until its setpoint leaves that line.
+    fn begin_cruise(
+        &mut self,
+        now: Instant,
+        channel: u8,
+        counts_per_s: f64,
+        ramp: core::time::Duration,
+    ) {
+        let _ = (now, channel, counts_per_s, ramp);
+    }
     /// Puts the axis's setpoint, in counts from its home mark (before homing: from where it
     /// stood at boot). Fractions matter to a simulated board; a stepper rounds them. Called at
     /// the end of every motion with its exact target, before anything is read while an axis
@@ -85,6 +96,12 @@ pub trait Board {
     }
     /// A dwell begins to integrate: gain and shutter are set.
     fn begin_dwell(&mut self, now: Instant, illumination: Illumination);
+    /// A window of a sweep begins to integrate, and ends at `until`: gain and shutter are set. A
+    /// board that need not know the end takes it as a dwell.
+    fn begin_window(&mut self, now: Instant, until: Instant, illumination: Illumination) {
+        let _ = until;
+        self.begin_dwell(now, illumination);
+    }
     /// One ADC reading over the interval that ends now, counts.
     fn convert(&mut self, now: Instant) -> Result<i32, BoardFault>;
     /// What the board noticed since it was last asked; one fault a call.

@@ -6,8 +6,8 @@
 use heapless::Vec;
 
 use crate::{
-    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult, Home,
-    Identity, MoveTo, Rejection, Shutter, Status, Sweep, Tick,
+    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Capabilities, Cause, CommandId, Done, Dwell,
+    DwellResult, Home, Identity, MoveTo, Rejection, Shutter, Status, Sweep, Tick, Window,
 };
 
 /// Has a largest encoding.
@@ -64,7 +64,7 @@ const fn largest(sizes: &[usize]) -> usize {
     largest
 }
 
-primitive!(bool: 1, u8: 1, u32: 5, i32: 5, f64: 8);
+primitive!(bool: 1, u8: 1, u16: 3, u32: 5, i32: 5, f64: 8);
 wrapper!(CommandId(u32), Tick(u32), AxisMask(u8), AxisCounts(Vec<i32, AXES_MAX>));
 
 impl<T: Bounded> Bounded for Option<T> {
@@ -93,7 +93,31 @@ structure!(Dwell {
     settle_us: u32,
     duration_us: u32,
 });
-structure!(Sweep { id: CommandId, gain: u8, window_us: u32, targets: AxisCounts });
+structure!(Sweep {
+    id: CommandId,
+    reading: u32,
+    gain: u8,
+    settle_us: u32,
+    lead_us: u32,
+    readings: u32,
+    windows: u16,
+    from: AxisCounts,
+    step: AxisCounts,
+});
+structure!(Capabilities { windows: u16 });
+structure!(Window {
+    id: CommandId,
+    index: u16,
+    mean: f64,
+    variance: f64,
+    min: i32,
+    max: i32,
+    saturated: u32,
+    start: AxisCounts,
+    moved: AxisCounts,
+    start_tick: Tick,
+    duration_us: u32,
+});
 structure!(Identity {
     protocol: (u8, u8),
     boot_id: u32,
@@ -151,4 +175,7 @@ choice!(Rejection {
     Senseless,
     Unhomed(u8),
     Unsupported,
+    TooFast(u8),
+    TooManyWindows(u16),
+    NoSuchWindow,
 });

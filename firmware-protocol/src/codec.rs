@@ -4,12 +4,17 @@
 use core::fmt;
 
 use crate::bounds::Bounded;
-use crate::frame::BODY_MAX;
+use crate::frame::{BODY_MAX, WIRE_MAX};
 use crate::packet::TAGS_MAX;
 use crate::{
-    Cause, CommandId, Done, Dwell, DwellResult, Event, Home, Identity, MoveTo, Rejection, Reply,
-    Request, Status, Sweep, Tick,
+    Capabilities, Cause, CommandId, Done, Dwell, DwellResult, Event, Home, Identity, MoveTo,
+    Rejection, Reply, Request, Status, Sweep, Tick, Window,
 };
+
+/// The most bytes that a window takes on the wire, of a device with six axes and every number at
+/// its longest; one with four axes and numbers as they occur takes some 80.
+pub const WINDOW_WIRE_MAX: usize = WIRE_MAX - BODY_MAX + TAGS_MAX + <Window as Bounded>::MAX;
+const _: () = assert!(WINDOW_WIRE_MAX <= 140, "windows have to be small: a sweep has hundreds");
 
 /// Why a body is no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,6 +137,8 @@ messages! {
         0x08 ClearFault,
         0x09 KeepAlive,
         0x0a Acknowledge(id: CommandId),
+        0x0b Capabilities,
+        0x0c FetchWindow(id: CommandId, index: u16),
     }
 }
 
@@ -146,6 +153,8 @@ messages! {
         0x46 Cleared,
         0x47 Alive,
         0x48 Acknowledged(id: CommandId),
+        0x49 Capabilities(capabilities: Capabilities),
+        0x4a Fetched(window: Window),
     }
 }
 
@@ -156,6 +165,7 @@ messages! {
         0x82 Done(done: Done),
         0x83 Sampled(result: DwellResult),
         0x84 Failed(id: CommandId, cause: Cause, tick: Tick),
+        0x85 Window(window: Window),
     }
 }
 
@@ -178,8 +188,13 @@ impl Request {
             | (Self::ReadStatus, Reply::Status(_))
             | (Self::Stop, Reply::Stopping)
             | (Self::ClearFault, Reply::Cleared | Reply::Rejected(..))
-            | (Self::KeepAlive, Reply::Alive) => true,
-            (Self::Acknowledge(id), Reply::Acknowledged(answered)) => id == answered,
+            | (Self::KeepAlive, Reply::Alive)
+            | (Self::Capabilities, Reply::Capabilities(_)) => true,
+            (Self::FetchWindow(id, index), Reply::Fetched(window)) => {
+                (*id, *index) == (window.id, window.index)
+            }
+            (Self::Acknowledge(id), Reply::Acknowledged(answered))
+            | (Self::FetchWindow(id, _), Reply::Rejected(answered, _)) => id == answered,
             (command, Reply::Accepted(id) | Reply::Rejected(id, _)) => {
                 command.command() == Some(*id)
             }
@@ -195,12 +210,13 @@ impl Event {
             Self::Started(id, _)
             | Self::Done(Done { id, .. })
             | Self::Sampled(DwellResult { id, .. })
+            | Self::Window(Window { id, .. })
             | Self::Failed(id, ..) => *id,
         }
     }
 
     /// Whether it ends its command, and so is repeated until it is acknowledged.
     pub const fn is_result(&self) -> bool {
-        !matches!(self, Self::Started(..))
+        !matches!(self, Self::Started(..) | Self::Window(_))
     }
 }

@@ -43,6 +43,8 @@ impl<B: Board> Device<B> {
     /// gives its length. Call after `handle_bytes` and `handle_timeout`, whenever the wire can
     /// take a frame, until it gives `None`; then ask [`Self::poll_timeout`].
     pub fn poll_transmit(&mut self, now: Instant, out: &mut [u8]) -> Option<usize> {
+        // Windows come one at a time, as fast as the wire takes them.
+        self.say_what_happened();
         self.link.poll_transmit(now, out)
     }
 

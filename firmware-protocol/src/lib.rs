@@ -24,23 +24,26 @@ mod host;
 mod message;
 mod motion;
 mod packet;
+mod sweep;
 mod time;
 
 pub use board::{Board, BoardFault, Illumination};
-pub use codec::{CodecError, EventType, ReplyType, RequestType};
+pub use codec::{CodecError, EventType, ReplyType, RequestType, WINDOW_WIRE_MAX};
 pub use decoder::{BadFrames, Decoder};
 pub use device::Device;
 pub use device_core::{
-    DeviceCore, LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD,
+    DeviceCore, LEASE, QUEUE_DEPTH, RESULTS_MAX, SEARCH_PERIOD, SETPOINT_PERIOD, WINDOWS_MAX,
 };
 pub use device_link::{DeviceEndpoint, Incoming, ReplyTo};
 pub use host::{
     HostEndpoint, HostEvent, LinkCause, LinkStatistics, Nonsense, SubmitError, Ticket, WINDOW,
 };
 pub use message::{
-    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult,
-    Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
+    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Capabilities, Cause, CommandId, Done, Dwell,
+    DwellResult, Event, Home, Identity, MoveTo, Rejection, Reply, Request, Shutter, Status, Sweep,
+    Window,
 };
 pub use motion::Trapezoid;
 pub use packet::{Foreign, NakReason, PROTOCOL, PacketError, Said, SessionTag, ToDevice, ToHost};
+pub use sweep::{Cruise, SweepMotion};
 pub use time::{Instant, Tick, TickUnwrapper};

@@ -6,16 +6,19 @@
 //! | 0x02 | `Home` | `Accepted` or `Rejected` | `Started`, `Done` or `Failed` |
 //! | 0x03 | `MoveTo` | `Accepted` or `Rejected` | `Started`, `Done` or `Failed` |
 //! | 0x04 | `Dwell` | `Accepted` or `Rejected` | `Started`, `Sampled` or `Failed` |
-//! | 0x05 | `Sweep` | `Rejected(Unsupported)` for now | |
+//! | 0x05 | `Sweep` | `Accepted` or `Rejected` | `Started`, `Window`s, `Done` or `Failed` |
 //! | 0x06 | `ReadStatus` | `Status` | |
 //! | 0x07 | `Stop` | `Stopping` | `Failed(Stopped)` for each command that it ends |
 //! | 0x08 | `ClearFault` | `Cleared` or `Rejected` | |
 //! | 0x09 | `KeepAlive` | `Alive` | |
 //! | 0x0a | `Acknowledge` | `Acknowledged` | |
+//! | 0x0b | `Capabilities` | `Capabilities` | |
+//! | 0x0c | `FetchWindow` | `Fetched` or `Rejected` | |
 //!
 //! Accepted means queued, not done. `Done`, `Sampled` and `Failed` stay on the device, and are
-//! sent again, until the host acknowledges their command. Commands run one at a time, in the
-//! order in which they were accepted.
+//! sent again, until the host acknowledges their command. A `Window` is said once and stays as
+//! long as its command's result: the host fetches those that were lost on the way. Commands run
+//! one at a time, in the order in which they were accepted.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -69,8 +72,12 @@ pub enum Request {
     ClearFault,
     /// Nothing but a sign of life.
     KeepAlive,
-    /// The result of this command has arrived and can be forgotten.
+    /// The result of this command has arrived, and its windows have: they can be forgotten.
     Acknowledge(CommandId),
+    /// What can you do beside what every device can? Since version 1.1.
+    Capabilities,
+    /// Say this window of this sweep again: counted from 0. Since version 1.1.
+    FetchWindow(CommandId, u16),
 }
 
 /// Finds the home marks of the axes in the mask.
@@ -109,17 +116,32 @@ pub struct Dwell {
     pub duration_us: u32,
 }
 
-/// Windows of integration latched while moving to `targets`.
+/// Integrates in windows that follow each other without a gap, while the axes move at constant
+/// speed. [`crate::SweepMotion`] says how.
+///
+/// The axes go to where they set out from as with a [`MoveTo`], wait there, come to speed
+/// together, keep it, and brake together behind the last window.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sweep {
     /// The command's number.
     pub id: CommandId,
-    /// The gain range.
+    /// The host's name for the first window's reading; the others' follow it one by one.
+    pub reading: u32,
+    /// The gain range, below [`Identity::gains`].
     pub gain: u8,
-    /// The length of a window, microseconds.
-    pub window_us: u32,
-    /// Where the sweep ends.
-    pub targets: AxisCounts,
+    /// Waiting at rest before the axes set out, microseconds.
+    pub settle_us: u32,
+    /// At constant speed before the first window, microseconds: what the acceleration has
+    /// excited dies away.
+    pub lead_us: u32,
+    /// The length of a window in ADC readings.
+    pub readings: u32,
+    /// How many windows.
+    pub windows: u16,
+    /// Where all axes are when the first window begins.
+    pub from: AxisCounts,
+    /// How far all axes go in each window.
+    pub step: AxisCounts,
 }
 
 /// What a device answers to a request.
@@ -141,9 +163,14 @@ pub enum Reply {
     Alive,
     /// To `Acknowledge`; also for a result that was not there any more.
     Acknowledged(CommandId),
+    /// To `Capabilities`.
+    Capabilities(Capabilities),
+    /// To `FetchWindow`.
+    Fetched(Window),
 }
 
-/// What a device says unasked. Every one but `Started` is repeated until it is acknowledged.
+/// What a device says unasked. Every one but `Started` and `Window` is repeated until it is
+/// acknowledged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Event {
     /// The command began.
@@ -154,6 +181,8 @@ pub enum Event {
     Sampled(DwellResult),
     /// The command ended without doing what it should.
     Failed(CommandId, Cause, Tick),
+    /// A window of a sweep has its reading. Since version 1.1.
+    Window(Window),
 }
 
 /// Who a device is.
@@ -175,6 +204,14 @@ pub struct Identity {
     pub adc_rate_hz: u32,
     /// One entry a channel.
     pub axes: Vec<AxisIdentity, AXES_MAX>,
+}
+
+/// What a device can do beside what every device can.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capabilities {
+    /// How many windows of sweeps it keeps, and so the most that one sweep can have; 0: it can't
+    /// sweep.
+    pub windows: u16,
 }
 
 /// An axis as the device knows it, in counts.
@@ -259,6 +296,35 @@ pub struct DwellResult {
 
 impl Eq for DwellResult {}
 
+/// A raw reading of one window of a sweep. Gain, length and name are as its command says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Window {
+    /// Which command.
+    pub id: CommandId,
+    /// Which of its windows, from 0.
+    pub index: u16,
+    /// The mean of its ADC readings, counts.
+    pub mean: f64,
+    /// Their variance (n - 1), counts squared; zero for a single reading.
+    pub variance: f64,
+    /// The smallest.
+    pub min: i32,
+    /// The largest.
+    pub max: i32,
+    /// How many stood at an end of the ADC's range.
+    pub saturated: u32,
+    /// Encoder positions latched when it began.
+    pub start: AxisCounts,
+    /// How far they had come when it ended.
+    pub moved: AxisCounts,
+    /// When it began.
+    pub start_tick: Tick,
+    /// How long it lasted, microseconds.
+    pub duration_us: u32,
+}
+
+impl Eq for Window {}
+
 /// Why a device refuses a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rejection {
@@ -276,6 +342,12 @@ pub enum Rejection {
     Unhomed(u8),
     /// This device can't do that.
     Unsupported,
+    /// An axis would have to go faster than it can: channel. Since version 1.1.
+    TooFast(u8),
+    /// A sweep has more windows than the device keeps: the most. Since version 1.1.
+    TooManyWindows(u16),
+    /// The window that is asked for is not there. Since version 1.1.
+    NoSuchWindow,
 }
 
 /// Why a command ended early, or why the device stands still.

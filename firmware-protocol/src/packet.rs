@@ -16,7 +16,7 @@ use crate::{Event, Reply, Request};
 
 /// The version spoken here, major and minor. Another major version is not understood; a greater
 /// minor version only adds messages.
-pub const PROTOCOL: (u8, u8) = (1, 0);
+pub const PROTOCOL: (u8, u8) = (1, 1);
 const _: () = assert!(PROTOCOL.0 < 16, "the frame has four bits for it");
 
 /// The longest tags.

@@ -7,7 +7,7 @@ use board::{Bench, Call, TestBoard, dwell, home, move_to};
 use firmware_protocol::{
     AxisCounts, AxisMask, BoardFault, Cause, CommandId, DeviceCore, Dwell, Event, Home,
     Illumination, Instant, LEASE, MoveTo, QUEUE_DEPTH, RESULTS_MAX, Rejection, Reply, Request,
-    Shutter, Sweep, Tick,
+    Shutter, Tick,
 };
 
 fn id_of(event: &Event) -> CommandId {
@@ -15,6 +15,7 @@ fn id_of(event: &Event) -> CommandId {
         Event::Started(id, _) | Event::Failed(id, _, _) => *id,
         Event::Done(done) => done.id,
         Event::Sampled(result) => result.id,
+        Event::Window(window) => window.id,
     }
 }
 
@@ -107,9 +108,6 @@ fn senseless_and_impossible_commands_are_refused() {
     assert_eq!(refused(&mut bench, beyond), Rejection::OutsideLimits(2, 50_001));
     let below = move_to([i32::MIN, 0, 0, 0]);
     assert_eq!(refused(&mut bench, below), Rejection::OutsideLimits(0, i32::MIN));
-    let targets = AxisCounts::default();
-    let sweep = |id| Request::Sweep(Sweep { id, gain: 0, window_us: 1, targets });
-    assert_eq!(refused(&mut bench, sweep), Rejection::Unsupported);
     bench.accept(at(2, 500));
 }
 

@@ -4,7 +4,7 @@
 use super::dwelling::Dwelling;
 use super::queue::Command;
 use super::{DeviceCore, RESULTS_MAX};
-use crate::{Board, Home, Rejection, Reply};
+use crate::{Board, Home, Rejection, Reply, Sweep, SweepMotion};
 
 impl<B: Board> DeviceCore<B> {
     /// Queues a command, and starts it if it is its turn, or says why not.
@@ -35,6 +35,7 @@ impl<B: Board> DeviceCore<B> {
                     return Err(Rejection::Senseless);
                 }
             }
+            Command::Sweep(sweep) => self.admit_sweep(sweep)?,
         }
         self.find_room()
     }
@@ -45,6 +46,23 @@ impl<B: Board> DeviceCore<B> {
             return Err(Rejection::Senseless);
         }
         Ok(())
+    }
+
+    fn admit_sweep(&self, sweep: &Sweep) -> Result<(), Rejection> {
+        if sweep.gain >= self.board.gains() {
+            return Err(Rejection::Senseless);
+        }
+        self.axes.check(&sweep.from)?;
+        let most = Self::capabilities().windows;
+        if sweep.windows > most {
+            return Err(Rejection::TooManyWindows(most));
+        }
+        self.motion_of(sweep).map(|_| ())
+    }
+
+    /// How this device's axes go on a sweep.
+    pub(super) fn motion_of(&self, sweep: &Sweep) -> Result<SweepMotion, Rejection> {
+        SweepMotion::new(self.axes.identities(), self.board.adc().1, sweep)
     }
 
     /// A command needs a place in the queue, and one for its result.

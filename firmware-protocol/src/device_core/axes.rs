@@ -4,7 +4,9 @@
 use heapless::Vec;
 
 use super::path::{Path, whole_micros};
-use crate::{AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Board, Instant, Rejection, Trapezoid};
+use crate::{
+    AXES_MAX, AxisCounts, AxisIdentity, AxisMask, Board, Instant, Rejection, SweepMotion, Trapezoid,
+};
 
 /// An axis searches its home mark at this fraction of its speed, so that it overruns the mark
 /// by 1/16 of the way in which it stops from full speed.
@@ -98,12 +100,18 @@ impl Axes {
         Ok(())
     }
 
-    /// Sets out for the targets: all axes start now, and arrive together when the slowest can.
-    pub(super) fn go_to(&mut self, now: Instant, targets: &AxisCounts, board: &mut impl Board) {
+    /// Sets out for the targets, one an axis: all start now, and arrive together when the slowest
+    /// can.
+    pub(super) fn go_to(
+        &mut self,
+        now: Instant,
+        targets: impl IntoIterator<Item = f64>,
+        board: &mut impl Board,
+    ) {
         let mut profiles: Vec<(Trapezoid, f64, f64), AXES_MAX> = Vec::new();
         let mut duration_us = 0;
-        for ((axis, path), &target) in self.identities.iter().zip(&self.paths).zip(&targets.0) {
-            let (from, to) = (path.destination(), f64::from(target));
+        for ((axis, path), to) in self.identities.iter().zip(&self.paths).zip(targets) {
+            let from = path.destination();
             let Some(profile) = Trapezoid::new((to - from).abs(), speed(axis), acceleration(axis))
             else {
                 continue;
@@ -113,6 +121,18 @@ impl Axes {
         }
         for ((channel, path), (profile, from, to)) in (0..).zip(&mut self.paths).zip(profiles) {
             *path = Path::leg(from, to, profile, now, duration_us);
+            announce(path, now, channel, board);
+        }
+    }
+
+    /// Sets out on a sweep, from where its motion begins.
+    pub(super) fn sweep(&mut self, now: Instant, motion: &SweepMotion, board: &mut impl Board) {
+        let ramp_s = motion.ramp_us() as f64 / 1e6;
+        for ((channel, path), cruise) in (0..).zip(&mut self.paths).zip(motion.axes()) {
+            let speed = cruise.counts_per_s.abs();
+            let (distance, acceleration) = ((cruise.to - cruise.from).abs(), speed / ramp_s);
+            let Some(profile) = Trapezoid::new(distance, speed, acceleration) else { continue };
+            *path = Path::leg(cruise.from, cruise.to, profile, now, motion.duration_us());
             announce(path, now, channel, board);
         }
     }

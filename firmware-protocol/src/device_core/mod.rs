@@ -17,18 +17,22 @@ mod path;
 mod queue;
 mod results;
 mod statistics;
+mod sweeping;
+mod windows;
 
 use core::time::Duration;
 
 use crate::{
-    AxisCounts, Board, BoardFault, Cause, CommandId, Done, Event, Identity, Instant, PROTOCOL,
-    Reply, Request, Status,
+    AxisCounts, Board, BoardFault, Capabilities, Cause, CommandId, Done, Event, Identity, Instant,
+    PROTOCOL, Rejection, Reply, Request, Status,
 };
 use axes::Axes;
 use dwelling::Dwelling;
 use homing::Homing;
 use queue::{Command, Queue};
 use results::Results;
+use sweeping::Sweeping;
+use windows::Windows;
 
 pub use homing::SEARCH_PERIOD;
 
@@ -45,6 +49,10 @@ pub const QUEUE_DEPTH: usize = 8;
 /// their place in it reserved.
 pub const RESULTS_MAX: usize = 16;
 
+/// Windows of sweeps that a device keeps until their sweep is acknowledged: 60 kB. A sweep starts
+/// when all of its windows have a place, so that none is ever lost.
+pub const WINDOWS_MAX: usize = 512;
+
 /// Faults that a board can report at one moment; more wait for the next.
 const FAULTS_AT_ONCE: usize = 8;
 
@@ -55,6 +63,7 @@ pub struct DeviceCore<B> {
     axes: Axes,
     queue: Queue,
     results: Results,
+    windows: Windows,
     running: Option<Running>,
     fault: Option<Cause>,
     /// The session of the last `Identify`.
@@ -70,10 +79,12 @@ struct Running {
     work: Work,
 }
 
+#[allow(clippy::large_enum_variant)] // there is one of it, and no heap
 enum Work {
     Moving,
     Homing(Homing),
     Dwelling(Dwelling),
+    Sweeping(Sweeping),
 }
 
 impl<B: Board> DeviceCore<B> {
@@ -84,6 +95,7 @@ impl<B: Board> DeviceCore<B> {
             board,
             queue: Queue::default(),
             results: Results::default(),
+            windows: Windows::default(),
             running: None,
             fault: None,
             session: None,
@@ -105,6 +117,11 @@ impl<B: Board> DeviceCore<B> {
             adc_rate_hz,
             axes: self.axes.identities().clone(),
         }
+    }
+
+    /// What this device can do beside what every device can.
+    pub fn capabilities() -> Capabilities {
+        Capabilities { windows: u16::try_from(WINDOWS_MAX).unwrap_or(u16::MAX) }
     }
 
     /// How the device is.
@@ -140,7 +157,7 @@ impl<B: Board> DeviceCore<B> {
             Request::Home(home) => self.offer(Command::Home(home.clone())),
             Request::MoveTo(move_to) => self.offer(Command::MoveTo(move_to.clone())),
             Request::Dwell(dwell) => self.offer(Command::Dwell(dwell.clone())),
-            Request::Sweep(sweep) => Reply::Rejected(sweep.id, crate::Rejection::Unsupported),
+            Request::Sweep(sweep) => self.offer(Command::Sweep(sweep.clone())),
             Request::ReadStatus => Reply::Status(self.status(now)),
             Request::Stop => {
                 self.stop(Cause::Stopped);
@@ -152,9 +169,18 @@ impl<B: Board> DeviceCore<B> {
             }
             Request::KeepAlive => Reply::Alive,
             Request::Acknowledge(id) => {
-                self.results.acknowledge(*id);
+                if self.results.acknowledge(*id) {
+                    self.windows.release(*id);
+                    // A sweep may have waited for their places.
+                    self.start_next();
+                }
                 Reply::Acknowledged(*id)
             }
+            Request::Capabilities => Reply::Capabilities(Self::capabilities()),
+            Request::FetchWindow(id, index) => match self.windows.get(*id, *index) {
+                Some(window) => Reply::Fetched(window.clone()),
+                None => Reply::Rejected(*id, Rejection::NoSuchWindow),
+            },
         }
     }
 
@@ -172,9 +198,9 @@ impl<B: Board> DeviceCore<B> {
 
     /// What happened, in order; each event once. Call it after every call that hands in a time,
     /// until it answers `None`. Results can be had again from
-    /// [`DeviceCore::pending_results`].
+    /// [`DeviceCore::pending_results`]. Windows come before the result of their sweep.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.results.poll()
+        self.windows.poll().map(Event::Window).or_else(|| self.results.poll())
     }
 
     /// Results that [`DeviceCore::poll_event`] gave and the host has not acknowledged, oldest
@@ -190,7 +216,8 @@ impl<B: Board> DeviceCore<B> {
     /// ([`SEARCH_PERIOD`]), a settling or an ADC reading ends, the lease runs out, the board
     /// asks for it ([`Board::wake_at`]), a moving axis wants its setpoint
     /// ([`SETPOINT_PERIOD`]). A board that [answers late](Board::answers_late) gets no setpoints
-    /// in between, and of a dwell the end of the settling and the end. It may change after
+    /// in between, of a dwell the end of the settling and the end, and of a sweep the ends of its
+    /// windows. It may change after
     /// every call that hands in a time, and when the board is changed through
     /// [`DeviceCore::board_mut`].
     pub fn poll_timeout(&self) -> Option<Instant> {
@@ -199,6 +226,9 @@ impl<B: Board> DeviceCore<B> {
         let wake = match &self.running {
             Some(Running { work: Work::Dwelling(dwelling), .. }) if !is_live => {
                 Some(dwelling.wake())
+            }
+            Some(Running { work: Work::Sweeping(sweeping), .. }) if !is_live => {
+                sweeping.wake(&self.axes, self.clock)
             }
             _ => self.work_due(),
         };
@@ -246,6 +276,7 @@ impl<B: Board> DeviceCore<B> {
             Work::Moving => self.axes.is_at_rest().then_some(self.clock),
             Work::Homing(homing) => homing.due(),
             Work::Dwelling(dwelling) => Some(dwelling.due()),
+            Work::Sweeping(sweeping) => sweeping.due(&self.axes, self.clock),
         }
     }
 
@@ -286,6 +317,10 @@ impl<B: Board> DeviceCore<B> {
                 .map(|result| result.map(|result| Some(Event::Sampled(result))))
                 .map_err(Cause::from),
             Work::Dwelling(_) => Ok(None),
+            Work::Sweeping(sweeping) => sweeping
+                .progress(now, &mut self.axes, &mut self.board, &mut self.windows)
+                .map(|is_over| is_over.then_some(None))
+                .map_err(Cause::from),
         };
         match ended {
             Ok(None) => {}
@@ -308,6 +343,11 @@ impl<B: Board> DeviceCore<B> {
         if self.running.is_some() || !self.axes.is_at_rest() {
             return;
         }
+        if let Some(Command::Sweep(sweep)) = self.queue.front()
+            && !self.windows.has_room(sweep.windows)
+        {
+            return;
+        }
         let Some(command) = self.queue.pop() else { return };
         let now = self.clock;
         let id = command.id();
@@ -317,10 +357,19 @@ impl<B: Board> DeviceCore<B> {
                 Work::Homing(Homing::begin(home.axes, now, &mut self.axes, &mut self.board))
             }
             Command::MoveTo(move_to) => {
-                self.axes.go_to(now, &move_to.targets, &mut self.board);
+                let targets = move_to.targets.0.iter().copied().map(f64::from);
+                self.axes.go_to(now, targets, &mut self.board);
                 Work::Moving
             }
             Command::Dwell(dwell) => Work::Dwelling(Dwelling::begin(dwell, now, &mut self.board)),
+            Command::Sweep(sweep) => match self.motion_of(&sweep) {
+                Ok(motion) => {
+                    let (axes, board) = (&mut self.axes, &mut self.board);
+                    Work::Sweeping(Sweeping::begin(sweep, motion, now, axes, board))
+                }
+                // It was checked when it was accepted.
+                Err(_) => Work::Moving,
+            },
         };
         self.running = Some(Running { id, work });
     }
@@ -354,6 +403,7 @@ impl<B: Board> DeviceCore<B> {
         if let Some(Running { id, .. }) = self.running.take() {
             self.results.keep(id, Event::Failed(id, cause, tick));
         }
+        self.windows.hush();
         while let Some(command) = self.queue.pop() {
             self.results.keep(command.id(), Event::Failed(command.id(), cause, tick));
         }
@@ -365,6 +415,7 @@ impl<B: Board> DeviceCore<B> {
         self.running = None;
         self.queue.clear();
         self.results.clear();
+        self.windows.clear();
     }
 }
 

@@ -3,7 +3,7 @@
 use heapless::Deque;
 
 use super::QUEUE_DEPTH;
-use crate::{CommandId, Dwell, Home, MoveTo};
+use crate::{CommandId, Dwell, Home, MoveTo, Sweep};
 
 /// A request that takes time.
 #[derive(Debug, Clone)]
@@ -11,6 +11,7 @@ pub(super) enum Command {
     Home(Home),
     MoveTo(MoveTo),
     Dwell(Dwell),
+    Sweep(Sweep),
 }
 
 impl Command {
@@ -19,6 +20,7 @@ impl Command {
             Self::Home(home) => home.id,
             Self::MoveTo(move_to) => move_to.id,
             Self::Dwell(dwell) => dwell.id,
+            Self::Sweep(sweep) => sweep.id,
         }
     }
 }
@@ -52,6 +54,11 @@ impl Queue {
         self.last_id = Some(command.id());
         let pushed = self.waiting.push_back(command);
         debug_assert!(pushed.is_ok(), "a full queue accepts nothing");
+    }
+
+    /// The next one, which stays.
+    pub(super) fn front(&self) -> Option<&Command> {
+        self.waiting.front()
     }
 
     pub(super) fn pop(&mut self) -> Option<Command> {

@@ -60,9 +60,12 @@ impl Results {
         self.kept.iter().filter(|kept| kept.was_said).map(|kept| &kept.event)
     }
 
-    /// Forgets a result that the host has. One that was never said stays: nobody can have it.
-    pub(super) fn acknowledge(&mut self, id: CommandId) {
+    /// Forgets a result that the host has, and says whether there was one. One that was never
+    /// said stays: nobody can have it.
+    pub(super) fn acknowledge(&mut self, id: CommandId) -> bool {
+        let before = self.kept.len();
         self.kept.retain(|kept| kept.id != id || !kept.was_said);
+        self.kept.len() < before
     }
 
     pub(super) fn clear(&mut self) {

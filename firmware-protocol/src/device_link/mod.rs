@@ -132,13 +132,13 @@ impl DeviceEndpoint {
         }
     }
 
-    /// Whether [`Self::say`] takes a result.
+    /// Whether [`Self::say`] takes any event.
     pub fn has_room(&self) -> bool {
         self.outbox.has_room()
     }
 
     /// Takes an event to say: a result is kept until the host acknowledges it. While there is
-    /// [no room](Self::has_room), a result is given back.
+    /// [no room](Self::has_room), a result or a window is given back.
     pub fn say(&mut self, event: Event) -> Result<(), Event> {
         self.outbox.push(event)
     }

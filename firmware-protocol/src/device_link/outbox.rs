@@ -41,20 +41,34 @@ impl Letter {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outbox {
     letters: Deque<Letter, PLACES>,
+    /// A window on its way: before the letters, since it happened before the results behind it.
+    window: Option<(u8, Event)>,
     next_seq: u8,
 }
 
 impl Outbox {
-    /// Whether a result finds a place.
+    /// Whether any event finds a place.
     pub(super) fn has_room(&self) -> bool {
+        self.window.is_none() && self.has_room_for_result()
+    }
+
+    fn has_room_for_result(&self) -> bool {
         self.count(true) < RESULTS
     }
 
-    /// Takes an event to say. A result without a place is given back; a start without one is
-    /// dropped.
+    /// Takes an event to say. A result or a window without a place is given back; a start without
+    /// one is dropped.
     pub(super) fn push(&mut self, event: Event) -> Result<(), Event> {
+        if matches!(event, Event::Window(_)) {
+            if self.window.is_some() {
+                return Err(event);
+            }
+            self.window = Some((self.next_seq, event));
+            self.next_seq = self.next_seq.wrapping_add(1);
+            return Ok(());
+        }
         let is_result = event.is_result();
-        if is_result && !self.has_room() {
+        if is_result && !self.has_room_for_result() {
             return Err(event);
         }
         let has_place = is_result || self.count(false) < STARTS;
@@ -83,6 +97,9 @@ impl Outbox {
 
     /// The next event to send. It counts as sent.
     pub(super) fn pop_due(&mut self, now: Instant) -> Option<(u8, Event)> {
+        if let Some(window) = self.window.take() {
+            return Some(window);
+        }
         let letter = self.letters.iter_mut().find(|letter| letter.due && !letter.is_over)?;
         letter.due = false;
         letter.is_over = !letter.event.is_result();

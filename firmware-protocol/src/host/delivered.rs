@@ -20,6 +20,10 @@ impl Delivered {
     /// Whether the event is news; it counts as handed on from now.
     pub(super) fn is_news(&mut self, event: &Event) -> bool {
         let id = event.command();
+        // Which windows it has is the user's to know.
+        if matches!(event, Event::Window(_)) {
+            return true;
+        }
         if self.has_result(id) {
             return false;
         }

@@ -3,6 +3,8 @@
 
 #![allow(dead_code)] // each test file uses a part of it
 
+use std::time::Duration;
+
 use firmware_protocol::{
     AxisCounts, AxisIdentity, AxisMask, Board, BoardFault, CommandId, DeviceCore, Dwell, Event,
     Home, Illumination, Instant, LEASE, MoveTo, Reply, Request, Shutter,
@@ -24,6 +26,8 @@ pub(crate) enum Call {
     Prepare(Instant, Illumination),
     BeginDwell(Instant, Illumination),
     Convert(Instant),
+    Cruise(Instant, u8, f64),
+    BeginWindow(Instant, Instant, Illumination),
 }
 
 #[derive(Debug, Clone)]
@@ -152,6 +156,15 @@ impl Board for TestBoard {
 
     fn begin_dwell(&mut self, now: Instant, illumination: Illumination) {
         self.calls.push(Call::BeginDwell(now, illumination));
+        self.illumination = Some(illumination);
+    }
+
+    fn begin_cruise(&mut self, now: Instant, channel: u8, counts_per_s: f64, _: Duration) {
+        self.calls.push(Call::Cruise(now, channel, counts_per_s));
+    }
+
+    fn begin_window(&mut self, now: Instant, until: Instant, illumination: Illumination) {
+        self.calls.push(Call::BeginWindow(now, until, illumination));
         self.illumination = Some(illumination);
     }
 

@@ -5,9 +5,9 @@
 use std::path::Path;
 
 use firmware_protocol::{
-    AxisCounts, AxisIdentity, AxisMask, Cause, CommandId, Done, Dwell, DwellResult, Event, Home,
-    Identity, MoveTo, NakReason, Rejection, Reply, Request, Said, SessionTag, Shutter, Status,
-    Sweep, Tick, ToDevice, ToHost,
+    AxisCounts, AxisIdentity, AxisMask, Capabilities, Cause, CommandId, Done, Dwell, DwellResult,
+    Event, Home, Identity, MoveTo, NakReason, Rejection, Reply, Request, Said, SessionTag, Shutter,
+    Status, Sweep, Tick, ToDevice, ToHost, Window,
 };
 use heapless::Vec as Few;
 
@@ -95,7 +95,17 @@ fn requests() -> Vec<(&'static str, Packet)> {
         settle_us: 50_000,
         duration_us: 200_000,
     };
-    let sweep = Sweep { id: CommandId(302), gain: 1, window_us: 10_000, targets: counts(&[1000]) };
+    let sweep = Sweep {
+        id: CommandId(302),
+        reading: 70_000,
+        gain: 1,
+        settle_us: 20_000,
+        lead_us: 50_000,
+        readings: 50,
+        windows: 10,
+        from: counts(&[-2500, 7]),
+        step: counts(&[500, 0]),
+    };
     let targets = counts(&[0, -1, i32::MAX, i32::MIN]);
     vec![
         ("identify", down(0, Request::Identify(SESSION))),
@@ -108,6 +118,8 @@ fn requests() -> Vec<(&'static str, Packet)> {
         ("clear-fault", down(255, Request::ClearFault)),
         ("keep-alive", down(0, Request::KeepAlive)),
         ("acknowledge", down(1, Request::Acknowledge(CommandId(300)))),
+        ("capabilities-asked", down(1, Request::Capabilities)),
+        ("fetch-window", down(6, Request::FetchWindow(CommandId(302), 9))),
     ]
 }
 
@@ -116,7 +128,7 @@ fn replies() -> Vec<(&'static str, Packet)> {
     let mut axes = Few::new();
     axes.extend([axis(38_000), axis(72_000)]);
     let identity = Identity {
-        protocol: (1, 0),
+        protocol: (1, 1),
         boot_id: BOOT,
         queue_depth: 8,
         lease_ms: 500,
@@ -137,7 +149,26 @@ fn replies() -> Vec<(&'static str, Packet)> {
         ("cleared", reply(255, Reply::Cleared)),
         ("alive", reply(0, Reply::Alive)),
         ("acknowledged", reply(1, Reply::Acknowledged(CommandId(300)))),
+        ("rejected-too-fast", reply(4, Reply::Rejected(CommandId(302), Rejection::TooFast(0)))),
+        ("capabilities", reply(1, Reply::Capabilities(Capabilities { windows: 512 }))),
+        ("fetched", reply(6, Reply::Fetched(window()))),
     ]
+}
+
+fn window() -> Window {
+    Window {
+        id: CommandId(302),
+        index: 9,
+        mean: -0.5,
+        variance: 2.25,
+        min: -3,
+        max: 4,
+        saturated: 0,
+        start: counts(&[2000, 7]),
+        moved: counts(&[500, 0]),
+        start_tick: Tick(1_000_000),
+        duration_us: 25_000,
+    }
 }
 
 fn largest() -> Packet {
@@ -213,6 +244,7 @@ fn events() -> Vec<(&'static str, Packet)> {
         ("started", event(0, Event::Started(CommandId(300), Tick(u32::MAX)))),
         ("done", event(1, Event::Done(done))),
         ("sampled", event(2, Event::Sampled(result))),
+        ("window", event(3, Event::Window(window()))),
         ("failed", event(3, Event::Failed(CommandId(302), Cause::Stopped, Tick(77)))),
     ]
 }
