@@ -1,13 +1,14 @@
 //! The board under the simulated device: axes that follow their setpoints, and a detector that
 //! sees the scene from where the axes really stand.
 
+use core::time::Duration;
 use std::sync::Arc;
 
 use firmware_protocol::{AxisIdentity, Board, BoardFault, Illumination, Instant, Shutter};
 
 use crate::Compiled;
 use crate::chance::mix;
-use crate::mechanics::{Axis, SeenRay};
+use crate::mechanics::{Axis, SeenRay, passing};
 use crate::optics;
 use crate::stage::Stages;
 use crate::time::Interval;
@@ -36,6 +37,14 @@ struct Dwelling {
     illumination: Illumination,
     /// Photocurrent at rest, once the axes rest.
     current_a: Option<f64>,
+    /// In a sweep's window: the photocurrents of the ADC readings that are still to come.
+    passing_a: std::vec::IntoIter<f64>,
+}
+
+impl Dwelling {
+    fn new(illumination: Illumination) -> Self {
+        Self { illumination, current_a: None, passing_a: Vec::new().into_iter() }
+    }
 }
 
 impl SimulatedBoard {
@@ -61,10 +70,7 @@ impl SimulatedBoard {
             axis_of_channel,
             stages: compiled.stages(),
             reading_s: 1.0 / f64::from(nominal.detector.adc_rate_hz),
-            dwell: Dwelling {
-                illumination: Illumination { reading: 0, gain: 0, shutter: Shutter::Closed },
-                current_a: None,
-            },
+            dwell: Dwelling::new(Illumination { reading: 0, gain: 0, shutter: Shutter::Closed }),
             compiled,
         }
     }
@@ -85,7 +91,7 @@ impl SimulatedBoard {
 
     /// The light's current over an ADC reading, amperes. At rest it is worked out once a dwell.
     fn photocurrent_a(&mut self, now: Instant) -> f64 {
-        if let Some(current_a) = self.dwell.current_a {
+        if let Some(current_a) = self.dwell.passing_a.next().or(self.dwell.current_a) {
             return current_a;
         }
         let rests_at = self.axes.iter().map(Axis::rests_at).max();
@@ -103,6 +109,24 @@ impl SimulatedBoard {
             self.dwell.current_a = Some(current_a);
         }
         current_a
+    }
+
+    /// Over each ADC reading of the window that begins now, amperes: the axes go on as they do.
+    fn passing_a(&self, now: Instant, until: Instant) -> Vec<f64> {
+        if !self.axes.iter().any(Axis::cruises) {
+            return Vec::new();
+        }
+        let window_s = until.since(now).as_secs_f64();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an hour at most
+        let readings = libm::round(window_s / self.reading_s) as usize;
+        let drawn = &self.compiled.drawn;
+        let light_a = |part: f64| {
+            let later_s = part * window_s;
+            let joints = core::array::from_fn(|i| self.axes[i].value_later(now, later_s));
+            let axis = drawn.kinematics.seen(joints);
+            self.compiled.optics.radiance(&axis) * drawn.current_per_radiance
+        };
+        passing::readings(light_a, readings, drawn.averages())
     }
 
     /// At a moment, amperes.
@@ -150,6 +174,13 @@ impl Board for SimulatedBoard {
         }
     }
 
+    fn begin_cruise(&mut self, now: Instant, channel: u8, counts_per_s: f64, ramp: Duration) {
+        self.dwell.current_a = None;
+        if let Some(axis) = self.axis(channel) {
+            axis.begin_cruise(now, counts_per_s, ramp.as_secs_f64());
+        }
+    }
+
     fn set_setpoint(&mut self, now: Instant, channel: u8, counts: f64) {
         self.dwell.current_a = None;
         if let Some(axis) = self.axis(channel) {
@@ -184,8 +215,13 @@ impl Board for SimulatedBoard {
     }
 
     fn begin_dwell(&mut self, now: Instant, illumination: Illumination) {
-        self.dwell = Dwelling { illumination, current_a: None };
+        self.dwell = Dwelling::new(illumination);
         self.stages.begin(now, illumination);
+    }
+
+    fn begin_window(&mut self, now: Instant, until: Instant, illumination: Illumination) {
+        self.begin_dwell(now, illumination);
+        self.dwell.passing_a = self.passing_a(now, until).into_iter();
     }
 
     fn convert(&mut self, now: Instant) -> Result<i32, BoardFault> {

@@ -13,6 +13,9 @@ pub struct Terms {
     pub region: Option<Region>,
     /// How long a reading integrates, seconds.
     pub dwell_s: f64,
+    /// The speeds of the fastest sweep, θ, φ, x, y, radians and metres a second; zero: readings are
+    /// taken at rest.
+    pub sweep: [f64; 4],
     /// How long the run takes, seconds: what drifts has so long to do it.
     pub run_s: f64,
     /// How much all that is left out may change a reading, relative to it. `None`: a tenth of the
@@ -37,6 +40,7 @@ impl Default for Terms {
             seed: 1,
             region: None,
             dwell_s: 0.05,
+            sweep: [0.0; 4],
             run_s: 3600.0,
             tolerance: None,
             force: Vec::new(),

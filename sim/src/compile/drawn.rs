@@ -47,6 +47,13 @@ impl Drawn {
     }
 }
 
+impl Drawn {
+    /// Whether an ADC reading in motion is the mean over its time.
+    pub(crate) fn averages(&self) -> bool {
+        self.moments.len() > 1
+    }
+}
+
 /// A number with its standard uncertainty, drawn; still positive, or refused.
 fn draw_positive(
     name: &'static str,

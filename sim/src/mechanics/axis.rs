@@ -39,6 +39,7 @@ pub(crate) struct AxisTruth {
     /// Where the limit switches stand, counts.
     switch_counts: (f64, f64),
     speed_counts_per_s: f64,
+    acceleration_counts_per_s2: f64,
 }
 
 /// A stepper that is asked for more torque than it has falls back by whole electrical cycles,
@@ -98,6 +99,7 @@ impl AxisTruth {
             start_counts: libm::round(low + fraction * (high - low)),
             switch_counts: (mark_counts + low - beyond, mark_counts + high + beyond),
             speed_counts_per_s: f64::from(axis.speed_counts_per_s),
+            acceleration_counts_per_s2: f64::from(axis.acceleration_counts_per_s2.max(1)),
         }
     }
 
@@ -113,8 +115,11 @@ impl AxisTruth {
 
     fn scale_error(&self, mechanical_counts: f64) -> f64 {
         let lines = self.lines.as_ref().map_or(0.0, |lines| lines.error_counts(mechanical_counts));
-        let sine = self.periodic.as_ref().map_or(0.0, |sine| sine.error_counts(mechanical_counts));
-        lines + sine
+        lines + self.periodic_error(mechanical_counts)
+    }
+
+    fn periodic_error(&self, mechanical_counts: f64) -> f64 {
+        self.periodic.as_ref().map_or(0.0, |sine| sine.error_counts(mechanical_counts))
     }
 
     /// What the n-th move since boot loses, counts: by its number, so that it does not depend on
@@ -146,11 +151,30 @@ pub(crate) struct Axis {
     /// its mark, less what steps were lost since.
     drive_ahead_counts: f64,
     moves: u64,
+    /// When the setpoint last moved unevenly.
     stopped: Instant,
+    cruise: Option<Cruise>,
     homings: u32,
     mark_counts: f64,
     search: Option<Search>,
     switches: Switches,
+}
+
+/// A setpoint that moves at constant speed.
+#[derive(Debug, Clone, Copy)]
+struct Cruise {
+    since: Instant,
+    from_counts: f64,
+    counts_per_s: f64,
+}
+
+/// A setpoint is on a cruise's line within what floats make of it, counts.
+const ON_LINE_COUNTS: f64 = 1e-6;
+
+impl Cruise {
+    fn setpoint(&self, now: Instant, later_s: f64) -> f64 {
+        self.from_counts + self.counts_per_s * (seconds(now.since(self.since)) + later_s)
+    }
 }
 
 /// A search for the home mark.
@@ -174,6 +198,7 @@ impl Axis {
             drive_ahead_counts: 0.0,
             moves: 0,
             stopped: Instant::ZERO,
+            cruise: None,
             homings: 0,
             mark_counts: truth.mark_found(0),
             search: None,
@@ -216,10 +241,31 @@ impl Axis {
         self.switches.look_at()
     }
 
+    /// The setpoint has come to a constant speed from rest, by even acceleration over `ramp_s`:
+    /// the load is still behind by what its servo lags at that, and swings, and comes in as after
+    /// a stop. It lags no constant speed.
+    pub(crate) fn begin_cruise(&mut self, now: Instant, counts_per_s: f64, ramp_s: f64) {
+        let part = counts_per_s / ramp_s / self.truth.acceleration_counts_per_s2;
+        self.settles_counts = self.truth.settling.map_or(0.0, |settling| settling.lagging(part));
+        self.rings_counts = -self.truth.rings.map_or(0.0, |rings| rings.excited(part));
+        self.stopped = now;
+        self.cruise = Some(Cruise { since: now, from_counts: self.setpoint_counts, counts_per_s });
+    }
+
     pub(crate) fn set_setpoint(&mut self, now: Instant, counts: f64) {
         self.switches.pass(now, self.origin_counts + counts);
         let moved = counts - self.setpoint_counts;
         if moved == 0.0 {
+            return;
+        }
+        let is_on_line =
+            |cruise: &Cruise| (cruise.setpoint(now, 0.0) - counts).abs() <= ON_LINE_COUNTS;
+        self.cruise = self.cruise.filter(is_on_line);
+        if self.cruise.is_some() {
+            self.setpoint_counts = counts;
+            if let Some(play) = &mut self.play {
+                play.drive(moved);
+            }
             return;
         }
         self.settles_counts = self.truth.settling.map_or(0.0, |settling| settling.after(moved));
@@ -243,10 +289,11 @@ impl Axis {
         }
     }
 
-    /// Of the load, counts from the origin.
-    fn position(&self, now: Instant) -> f64 {
-        let mut position = self.setpoint_counts + self.ahead_counts();
-        let since_s = seconds(now.since(self.stopped));
+    /// Of the load, counts from the origin, so much later than now.
+    fn position(&self, now: Instant, later_s: f64) -> f64 {
+        let line = self.cruise.map(|cruise| cruise.setpoint(now, later_s));
+        let mut position = line.unwrap_or(self.setpoint_counts) + self.ahead_counts();
+        let since_s = seconds(now.since(self.stopped)) + later_s;
         if let Some(settling) = &self.truth.settling {
             position += self.settles_counts * settling.left(since_s);
         }
@@ -256,16 +303,38 @@ impl Axis {
         position
     }
 
-    /// What an encoder reads: the nearest count.
+    /// What an encoder reads: the nearest count. At rest the line that it stands on is read
+    /// exactly, and the value departs from it; in flight the value goes evenly, and what is
+    /// latched departs.
     #[allow(clippy::cast_possible_truncation)] // saturates beyond any axis
     pub(crate) fn readback(&self, now: Instant, has_encoder: bool) -> i32 {
-        libm::round(if has_encoder { self.position(now) } else { self.setpoint_counts }) as i32
+        if !has_encoder {
+            return libm::round(self.setpoint_counts) as i32;
+        }
+        let position = self.position(now, 0.0);
+        let lines = self.cruise.and(self.truth.lines.as_ref());
+        let error = lines.map_or(0.0, |lines| lines.error_counts(self.origin_counts + position));
+        libm::round(position - error) as i32
     }
 
     /// The axis's true value, radians or metres.
     pub(crate) fn value(&self, now: Instant) -> f64 {
-        let mechanical = self.origin_counts + self.position(now);
-        (mechanical + self.truth.scale_error(mechanical)) / self.truth.counts_per_unit
+        self.value_later(now, 0.0)
+    }
+
+    /// The same so many seconds later, if the setpoint goes on as it does.
+    pub(crate) fn value_later(&self, now: Instant, later_s: f64) -> f64 {
+        let mechanical = self.origin_counts + self.position(now, later_s);
+        let error = match self.cruise {
+            None => self.truth.scale_error(mechanical),
+            Some(_) => self.truth.periodic_error(mechanical),
+        };
+        (mechanical + error) / self.truth.counts_per_unit
+    }
+
+    /// Whether it moves at constant speed.
+    pub(crate) const fn cruises(&self) -> bool {
+        self.cruise.is_some()
     }
 
     /// When the axis will be at rest.
@@ -301,6 +370,7 @@ impl Axis {
         self.setpoint_counts = 0.0;
         self.settles_counts = 0.0;
         self.rings_counts = 0.0;
+        self.cruise = None;
         self.homings += 1;
     }
 }

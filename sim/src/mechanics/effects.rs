@@ -281,10 +281,22 @@ impl Weighing<'_> {
         self.largest(&[&|joints| moved(joints, 1.0), &|joints| moved(joints, -1.0)])
     }
 
-    /// Of the axes that are not at rest when their stated time to settle is over.
+    /// Of the axes that move while a window integrates, and of those that are not at rest when
+    /// their stated time to settle is over.
     fn of_smear(&self) -> Candidate {
         let mut names = Vec::new();
         let mut influence = 0.0;
+        let mut sweeps = Vec::new();
+        let Setting { nominal, terms, .. } = self.setting;
+        let reading_s = 1.0 / f64::from(nominal.detector.adc_rate_hz);
+        for (i, speed) in terms.sweep.into_iter().enumerate().filter(|(_, speed)| *speed > 0.0) {
+            let (_, key, per_key) = units(i);
+            sweeps.push(format!("{} sweeps at {:.3} {key}/s", AXIS_NAMES[i], speed * per_key));
+            // A reading's end is half of it ahead of its middle.
+            if let Influence::Relative(of_axis) = self.off(i, 0.5 * speed * reading_s) {
+                influence += of_axis;
+            }
+        }
         for (i, name) in AXIS_NAMES.into_iter().enumerate() {
             let smeared = self.smeared(i);
             if !smeared.is_empty() {
@@ -296,15 +308,18 @@ impl Weighing<'_> {
                 }
             }
         }
-        let key = if names.is_empty() {
+        if !names.is_empty() {
+            sweeps.push(format!("{} moves on beyond its time to settle", names.join(", ")));
+        }
+        let key = if sweeps.is_empty() {
             "dwells are taken at rest: no axis moves on beyond its time to settle".to_owned()
         } else {
-            format!("{} moves on beyond its time to settle", names.join(", "))
+            sweeps.join("; ")
         };
         Candidate::of_key(
             MOTION_SMEAR,
             &key,
-            !names.is_empty(),
+            !sweeps.is_empty(),
             Influence::Relative(influence),
             "until the axes rest, each ADC reading is the mean over the places passed in its time",
         )

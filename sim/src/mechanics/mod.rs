@@ -9,6 +9,7 @@ mod axis;
 mod effects;
 mod flaws;
 mod geometry;
+pub(crate) mod passing;
 mod play;
 mod ringing;
 mod scale;

@@ -35,6 +35,11 @@ impl Rings {
         moved_counts.clamp(-self.amplitude_counts, self.amplitude_counts)
     }
 
+    /// By how much it begins to ring when an acceleration ends, as a part of the axis's own.
+    pub(super) const fn excited(&self, part: f64) -> f64 {
+        self.amplitude_counts * part.clamp(-1.0, 1.0)
+    }
+
     /// What is left of an oscillation that began with one, so many seconds after the stop.
     pub(crate) fn left(&self, since_s: f64) -> f64 {
         if since_s >= self.lasts_s {

@@ -32,6 +32,11 @@ impl Settling {
         -moved_counts.clamp(-self.lag_counts, self.lag_counts)
     }
 
+    /// By how much it is ahead at an acceleration of this part of the axis's own: it is behind.
+    pub(super) const fn lagging(&self, part: f64) -> f64 {
+        -self.lag_counts * part.clamp(-1.0, 1.0)
+    }
+
     /// What is left of that, as a part, so many seconds after the stop.
     pub(super) fn left(&self, since_s: f64) -> f64 {
         let rest = (1.0 - since_s / self.time_s).max(0.0);

@@ -1,7 +1,7 @@
 //! Motion smear: an ADC reading averages over the places that the axes pass in its time.
 //!
-//! The device takes its readings at rest, so that only an axis that still rings, or takes longer to
-//! settle than is stated, smears.
+//! At rest only an axis smears that still rings, or takes longer to settle than is stated. In a
+//! sweep's window every reading does; there [`super::passing`] averages.
 
 /// A moment of an ADC reading: how long before its end, as a part of it, and its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use firmware_protocol::{
     AxisCounts, AxisMask, CommandId, Device, Done, Dwell, DwellResult, Event, Home, HostEndpoint,
-    HostEvent, Instant, MoveTo, Reply, Request, Shutter, frame,
+    HostEvent, Instant, MoveTo, Reply, Request, Shutter, Sweep, Window, frame,
 };
 use sim::{
     Compiled, Nominal, NominalAxis, NominalDetector, NominalGain, Quantity, Scene, Simulated,
@@ -92,12 +92,19 @@ pub struct Host<S> {
     stream: S,
     boot: tokio::time::Instant,
     next_id: u32,
+    spoke: Instant,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Host<S> {
     pub fn new(stream: S, session: u32, baud: u32) -> Self {
         let boot = tokio::time::Instant::now();
-        Self { endpoint: HostEndpoint::new(session, baud), stream, boot, next_id: 0 }
+        Self {
+            endpoint: HostEndpoint::new(session, baud),
+            stream,
+            boot,
+            next_id: 0,
+            spoke: Instant::ZERO,
+        }
     }
 
     fn now(&self) -> Instant {
@@ -118,15 +125,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Host<S> {
             let mut wire = [0; frame::WIRE_MAX];
             while let Some(len) = self.endpoint.poll_transmit(self.now(), &mut wire) {
                 self.stream.write_all(&wire[..len]).await.unwrap();
+                self.spoke = self.now();
             }
-            let alive = self.now() + Duration::from_millis(100);
+            let alive = self.spoke + Duration::from_millis(100);
             let deadline = self.endpoint.poll_timeout().map_or(alive, |at| at.min(alive));
             let mut buffer = [0; 256];
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(self.boot + (deadline - Instant::ZERO)) => {
                     self.endpoint.handle_timeout(self.now());
-                    if deadline == alive && self.endpoint.is_open() {
+                    if deadline == alive {
+                        self.spoke = self.now();
                         let _ = self.endpoint.submit(self.now(), Request::KeepAlive);
                     }
                 }
@@ -174,6 +183,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Host<S> {
                         Event::Done(done) => done.id,
                         Event::Sampled(sampled) => sampled.id,
                         Event::Failed(id, ..) | Event::Started(id, _) => *id,
+                        Event::Window(_) => return event,
                     };
                     self.submit(Request::Acknowledge(id)).await;
                     return event;
@@ -214,6 +224,35 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Host<S> {
             Event::Sampled(result) => result,
             other => panic!("{other:?}"),
         }
+    }
+
+    /// The windows of a sweep, in order: those that were lost on the way are fetched.
+    pub async fn sweep(&mut self, sweep: Sweep) -> Vec<Window> {
+        let id = self.id();
+        let count = sweep.windows;
+        self.submit(Request::Sweep(Sweep { id, ..sweep })).await;
+        let mut windows = std::collections::BTreeMap::new();
+        loop {
+            match self.event().await {
+                HostEvent::Event(Event::Window(window)) => {
+                    windows.insert(window.index, window);
+                }
+                HostEvent::Event(Event::Done(_)) => break,
+                HostEvent::Event(Event::Failed(..)) => panic!("the sweep failed"),
+                HostEvent::Reply { reply: Reply::Rejected(_, why), .. } => panic!("{why:?}"),
+                _ => {}
+            }
+        }
+        let missing: Vec<u16> = (0..count).filter(|index| !windows.contains_key(index)).collect();
+        for index in missing {
+            self.submit(Request::FetchWindow(id, index)).await;
+            match self.reply().await {
+                Reply::Fetched(window) => windows.insert(index, window),
+                other => panic!("{other:?}"),
+            };
+        }
+        self.submit(Request::Acknowledge(id)).await;
+        windows.into_values().collect()
     }
 
     /// The number of the last command that another host gave this device.
