@@ -57,7 +57,7 @@ pub(crate) fn explain(args: &ExplainArgs) -> Outcome {
         None => args.effects.terms(SEED),
         Some((plan, path)) => {
             let (_, sequence) = lay_out(&mut inputs, path, plan, &rig)?;
-            terms_of(plan, &sequence, SEED, &wishes)
+            terms_of(&rig, plan, &sequence, SEED, &wishes)
         }
     };
     let stage = stage_at(&mut inputs, &args.scene, &rig, &terms)?;

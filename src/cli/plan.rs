@@ -36,6 +36,9 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
         row("targets", prediction.targets.to_string()),
         row("readings", prediction.readings.to_string()),
     ];
+    if let Some(sweeps) = sweeps(setup) {
+        rows.push(row("sweeps", sweeps));
+    }
     for (axis, travel) in AXES.iter().zip(prediction.travel) {
         rows.push(row(&format!("travel {}", axis.name()), axis.in_file_unit(travel)));
     }
@@ -58,6 +61,21 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
     table(&rows)
 }
 
+/// How many, how fast, and how far a window goes.
+fn sweeps(setup: &Setup) -> Option<String> {
+    let (sequence, rig) = (&setup.sequence, &setup.rig);
+    let window = sequence.steps.iter().find(|step| step.swept.is_some())?;
+    let [theta, ..] = sequence.speeds(rig);
+    let travel = rig.axes[0].position(f64::from(window.swept?.travel.0[0])).abs();
+    Some(format!(
+        "{} at {:.2}°/s, windows of {:.1} ms and {:.3}°",
+        sequence.sweeps(),
+        theta.to_degrees(),
+        window.dwell.as_secs_f64() * 1e3,
+        travel.to_degrees(),
+    ))
+}
+
 fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
     let fit = match outlook(setup) {
         Some(Ok(outlook)) => json!({
@@ -75,6 +93,10 @@ fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
         "simulated": setup.rig.is_simulated(),
         "targets": prediction.targets,
         "readings": prediction.readings,
+        "sweeps": {
+            "count": setup.sequence.sweeps(),
+            "speed_deg_per_s": setup.sequence.speeds(&setup.rig)[0].to_degrees(),
+        },
         "travel": {
             "theta_deg": theta.to_degrees(), "phi_deg": phi.to_degrees(),
             "x_mm": x * 1e3, "y_mm": y * 1e3,

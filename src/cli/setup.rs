@@ -84,7 +84,7 @@ impl Setup {
     pub(crate) fn with_plan(&self, plan: Plan, seed: u64) -> Result<Self, Failure> {
         let sequence = plan.lay_out(&self.rig, self.list.as_ref())?;
         let plan_hash = plan.hash(&sequence);
-        let terms = terms_of(&plan, &sequence, seed, &self.wishes);
+        let terms = terms_of(&self.rig, &plan, &sequence, seed, &self.wishes);
         let stage = self.stage.as_ref();
         let stage = stage.map(|stage| stage.on_terms(&self.rig, &terms)).transpose()?;
         Ok(Self { plan, plan_hash, sequence, stage, seed, ..self.clone() })
@@ -102,7 +102,7 @@ impl Setup {
         let (list, sequence) = lay_out(&mut inputs, plan_path, &plan, &rig)?;
         let plan_hash = plan.hash(&sequence);
         let Choice { seed, ref wishes, .. } = choice;
-        let terms = terms_of(&plan, &sequence, seed, wishes);
+        let terms = terms_of(&rig, &plan, &sequence, seed, wishes);
         let stage = read_stage(&mut inputs, plan_path, &plan, &choice, &rig, &terms)?;
         let (inputs, wishes) = (inputs.read().to_vec(), choice.wishes);
         Ok(Self { plan, plan_name, plan_hash, rig, sequence, list, stage, seed, wishes, inputs })
@@ -146,6 +146,7 @@ fn terms_without_plan(seed: u64, wishes: &EffectWishes) -> sim::Terms {
 
 /// On which terms a plan's rig is compiled.
 pub(crate) fn terms_of(
+    rig: &Rig,
     plan: &Plan,
     sequence: &Sequence,
     seed: u64,
@@ -158,6 +159,7 @@ pub(crate) fn terms_of(
     sim::Terms {
         region: Some(region_of(plan)),
         dwell_s: plan.dwell.as_secs_f64(),
+        sweep: sequence.speeds(rig),
         run_s: sequence.prediction.total_s(),
         ..terms
     }

@@ -234,6 +234,7 @@ fn reading(id: u32, kind: ReadingKind) -> Reading {
         max: 2000,
         saturated: 0,
         commanded: Latched([10_000, 0, 1000, 0]),
+        travel: Latched([0; 4]),
         start: Latched([10_000, 0, 1001, 0]),
         end: Latched([10_000, 0, 1001, 0]),
         start_us: 500_000,

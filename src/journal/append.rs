@@ -8,7 +8,7 @@ use rusqlite::{Connection, Transaction, TransactionBehavior, params};
 use super::lock::AppendLock;
 use super::{Header, Input, JournalError, Reader, Record, read, schema, steps};
 use crate::plan::Step;
-use crate::rig::{Reading, ReadingKind};
+use crate::rig::{Latched, Reading, ReadingKind};
 
 /// The largest input file that a journal takes, bytes.
 const INPUT_BYTES_MAX: usize = 64 << 20;
@@ -138,6 +138,12 @@ fn insert<'a>(connection: &Connection, record: &'a Record) -> rusqlite::Result<I
         Record::Reading(reading) => {
             if insert_reading(connection, reading)? == 0 {
                 return Ok(Inserted::Taken(reading));
+            }
+            if reading.travel != Latched::ZERO {
+                let Latched([theta, phi, x, y]) = reading.travel;
+                connection
+                    .prepare_cached("INSERT INTO swept_readings VALUES (?1, ?2, ?3, ?4, ?5)")?
+                    .execute(params![reading.id, theta, phi, x, y])?;
             }
         }
         Record::Event(event) => {

@@ -16,8 +16,9 @@ const READING: &str = "
 SELECT position, id, kind, target_index, target_repeat, gain, n, mean, variance, min, max, saturated,
     commanded_theta, commanded_phi, commanded_x, commanded_y, start_theta, start_phi, start_x,
     start_y, end_theta, end_phi, end_x, end_y, start_us, end_us, time_s, session, link_retries,
-    unsettled
-FROM readings ";
+    unsettled, coalesce(travel_theta, 0), coalesce(travel_phi, 0), coalesce(travel_x, 0),
+    coalesce(travel_y, 0)
+FROM readings LEFT JOIN swept_readings USING (id) ";
 
 /// In which order readings come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -252,6 +253,7 @@ fn reading_from_row(row: &Row<'_>) -> rusqlite::Result<Reading> {
         session: row.get(27)?,
         link_retries: row.get(28)?,
         unsettled: row.get(29)?,
+        travel: latched_from_row(row, 30)?,
     })
 }
 

@@ -12,7 +12,10 @@ use rusqlite::{Connection, OpenFlags};
 use super::JournalError;
 
 /// Raised whenever a table changes.
-pub(super) const VERSION: i64 = 1;
+pub(super) const VERSION: i64 = 2;
+
+/// Version 1 had no sweeps; but for their tables it is the same.
+const WITHOUT_SWEEPS: i64 = 1;
 
 /// "GoNi": what `file` and SQLite call the application id.
 pub(super) const APPLICATION_ID: i64 = 0x476f_4e69;
@@ -119,6 +122,27 @@ CREATE TABLE reference_checks (
 ) STRICT;
 ";
 
+/// What steps and readings have more that are windows of sweeps.
+const SWEEPS: &str = "
+CREATE {temporary} TABLE swept_steps (
+    id INTEGER PRIMARY KEY,
+    first INTEGER NOT NULL,
+    count INTEGER NOT NULL,
+    travel_theta INTEGER NOT NULL,
+    travel_phi INTEGER NOT NULL,
+    travel_x INTEGER NOT NULL,
+    travel_y INTEGER NOT NULL,
+    lead_ns INTEGER NOT NULL
+) STRICT;
+CREATE {temporary} TABLE swept_readings (
+    id INTEGER PRIMARY KEY,
+    travel_theta INTEGER NOT NULL,
+    travel_phi INTEGER NOT NULL,
+    travel_x INTEGER NOT NULL,
+    travel_y INTEGER NOT NULL
+) STRICT;
+";
+
 /// Before the first transaction.
 pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "page_size", PAGE_BYTES.cast_signed())
@@ -127,6 +151,7 @@ pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
 /// Creates the tables in an open transaction, and marks the file as a journal.
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch(TABLES)?;
+    connection.execute_batch(&SWEEPS.replace("{temporary}", ""))?;
     connection.pragma_update(None, "application_id", APPLICATION_ID)?;
     connection.pragma_update(None, "user_version", VERSION)
 }
@@ -196,7 +221,12 @@ pub(super) fn check(path: &Path, connection: &Connection) -> Result<(), JournalE
         return Err(JournalError::NotAJournal { path: path.to_owned(), found });
     }
     let found = pragma("user_version").map_err(fail)?;
-    if found != VERSION {
+    if found == WITHOUT_SWEEPS {
+        // Empty, for this connection alone, so that one way of reading does for both.
+        let empty = SWEEPS.replace("{temporary}", "TEMPORARY");
+        connection.execute_batch("PRAGMA temp_store = MEMORY;").map_err(fail)?;
+        connection.execute_batch(&empty).map_err(fail)?;
+    } else if found != VERSION {
         let path = path.to_owned();
         return Err(JournalError::Schema { path, found, expected: VERSION });
     }

@@ -9,7 +9,7 @@ use rusqlite::{Connection, Row, params};
 
 use super::append::kind_columns;
 use super::read::{kind_from_row, latched_from_row};
-use crate::plan::Step;
+use crate::plan::{Step, Swept};
 use crate::rig::{AxisPositions, Latched, Pose};
 
 const INSERT: &str = "
@@ -22,8 +22,11 @@ VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?
 pub(super) const SELECT: &str = "
 SELECT id, kind, target_index, target_repeat, x_m, y_m, theta_rad, phi_rad,
     axis_theta_rad, axis_phi_rad, axis_x_m, axis_y_m, theta, phi, x, y, via_theta, via_phi, via_x,
-    via_y, settle_ns, gain, dwell_ns, shutter, source_off
-FROM steps ORDER BY position";
+    via_y, settle_ns, gain, dwell_ns, shutter, source_off, first, count, travel_theta, travel_phi,
+    travel_x, travel_y, lead_ns
+FROM steps LEFT JOIN swept_steps USING (id) ORDER BY position";
+
+const INSERT_SWEPT: &str = "INSERT INTO swept_steps VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
 
 pub(super) fn insert(connection: &Connection, step: &Step) -> rusqlite::Result<()> {
     let (kind, index, repeat) = kind_columns(step.kind);
@@ -58,6 +61,12 @@ pub(super) fn insert(connection: &Connection, step: &Step) -> rusqlite::Result<(
         shutter_name(step.shutter),
         step.source_off,
     ])?;
+    if let Some(Swept { first, count, travel: Latched([theta, phi, x, y]), lead }) = step.swept {
+        let lead_ns = nanoseconds(lead)?;
+        connection
+            .prepare_cached(INSERT_SWEPT)?
+            .execute(params![step.id, first, count, theta, phi, x, y, lead_ns])?;
+    }
     Ok(())
 }
 
@@ -85,7 +94,14 @@ pub(super) fn from_row(row: &Row<'_>) -> rusqlite::Result<Step> {
             _ => Shutter::Open,
         },
         source_off: row.get(24)?,
+        swept: swept(row)?,
     })
+}
+
+fn swept(row: &Row<'_>) -> rusqlite::Result<Option<Swept>> {
+    let Some(first) = row.get::<_, Option<u32>>(25)? else { return Ok(None) };
+    let (count, travel) = (row.get(26)?, latched_from_row(row, 27)?);
+    Ok(Some(Swept { first, count, travel, lead: duration(row, 31)? }))
 }
 
 fn shutter_name(shutter: Shutter) -> &'static str {

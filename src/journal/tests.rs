@@ -10,7 +10,7 @@ use firmware_protocol::Shutter;
 use proptest::prelude::*;
 
 use super::*;
-use crate::plan::Step;
+use crate::plan::{Step, Swept};
 use crate::rig::{AxisPositions, Latched, Pose, Reading, ReadingKind};
 
 pub(super) struct Folder(tempfile::TempDir);
@@ -69,6 +69,7 @@ fn steps() -> Vec<Step> {
         dwell: Duration::from_millis(200),
         shutter: Shutter::Closed,
         source_off: false,
+        swept: None,
     };
     let target = Step {
         id: 1,
@@ -82,8 +83,12 @@ fn steps() -> Vec<Step> {
         dwell: Duration::from_micros(50_001),
         shutter: Shutter::Open,
         source_off: true,
+        swept: None,
     };
-    vec![dark, target]
+    let travel = Latched([-500, 0, 3, 0]);
+    let swept = Swept { first: 2, count: 12, travel, lead: Duration::from_millis(50) };
+    let window = Step { id: 2, swept: Some(swept), ..target };
+    vec![dark, target, window]
 }
 
 pub(super) fn reading(id: u32) -> Reading {
@@ -98,6 +103,8 @@ pub(super) fn reading(id: u32) -> Reading {
         max: 2000,
         saturated: 0,
         commanded: Latched([1, 2, 3, 4]),
+        // Every third is a window of a sweep.
+        travel: Latched([if id.is_multiple_of(3) { 250 } else { 0 }, 0, 0, 0]),
         start: Latched([1, 2, 3, 5]),
         end: Latched([1, 2, 3, 6]),
         start_us: i64::from(id) * 100_000,
@@ -298,12 +305,29 @@ fn what_is_not_a_journal_is_named() {
 }
 
 #[test]
+fn a_journal_from_before_there_were_sweeps_is_read_and_carried_on() {
+    let folder = Folder::new();
+    let mut journal = folder.journal();
+    let at_rest = |id| Reading { travel: Latched([0; 4]), ..reading(id) };
+    journal.append(&[Record::Reading(at_rest(0))]).unwrap();
+    let old = "DROP TABLE swept_steps; DROP TABLE swept_readings; PRAGMA user_version = 1;";
+    journal.reader().connection().execute_batch(old).unwrap();
+    journal.close().unwrap();
+    let readings = |reader: &Reader| reader.readings(Order::Id).unwrap();
+    assert_eq!(readings(&Reader::open(&folder.path()).unwrap()), [at_rest(0)]);
+    let mut journal = Journal::open(&folder.path()).unwrap();
+    assert!(journal.reader().steps().unwrap().iter().all(|step| step.swept.is_none()));
+    journal.append(&[Record::Reading(at_rest(1))]).unwrap();
+    assert_eq!(readings(journal.reader()), [at_rest(0), at_rest(1)]);
+}
+
+#[test]
 fn another_schema_is_refused() {
     let folder = Folder::new();
     let journal = folder.journal();
     journal.reader().connection().pragma_update(None, "user_version", 99).unwrap();
     drop(journal);
-    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 1 };
+    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 2 };
     assert_eq!(Journal::open(&folder.path()).unwrap_err(), error);
     assert_eq!(Reader::open(&folder.path()).unwrap_err(), error);
 }

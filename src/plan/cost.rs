@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::{Step, Target};
-use crate::rig::{Latched, ReadingKind, Rig};
+use crate::rig::{Latched, ReadingKind, Rig, set_out};
 
 /// A device looks for its home marks at about this part of its speed.
 const HOMING_SPEED: f64 = 0.25;
@@ -45,8 +45,12 @@ pub struct StepTime {
 }
 
 impl StepTime {
-    /// Of a step that begins at `from`.
+    /// Of a step that begins at `from`. A sweep's windows take their own time; its first one also
+    /// what comes before it, its last one the braking.
     pub fn of(rig: &Rig, from: Latched, step: &Step) -> Self {
+        if step.swept.is_some() {
+            return Self::of_window(rig, from, step);
+        }
         let route = rig.route(from, step.counts);
         let moving_s = match route.via {
             None => rig.move_duration(from, step.counts),
@@ -58,6 +62,30 @@ impl StepTime {
             settling_s: route.settle.as_secs_f64(),
             dwelling_s: f64::from(adc.readings_in(step.dwell)) / f64::from(adc.rate_hz),
         }
+    }
+
+    fn of_window(rig: &Rig, from: Latched, step: &Step) -> Self {
+        let adc = rig.detector.adc;
+        let dwelling_s = f64::from(adc.readings_in(step.dwell)) / f64::from(adc.rate_hz);
+        let mut time = Self { dwelling_s, ..Self::default() };
+        let (Some(swept), Some(flight)) = (step.swept, step.flight(1)) else { return time };
+        // A plan's flights are within the limits.
+        let Ok(motion) = rig.flight(flight) else { return time };
+        if from != step.counts || swept.first == step.id {
+            let route = rig.route_to_flight(from, flight, &motion);
+            let set_out = set_out(&motion);
+            let mut here = from;
+            for stop in route.via.into_iter().chain([set_out]) {
+                time.moving_s += rig.move_duration(here, stop).as_secs_f64();
+                here = stop;
+            }
+            time.settling_s = route.settle.as_secs_f64();
+            time.moving_s += motion.before_us() as f64 / 1e6;
+        }
+        if step.id + 1 == swept.first + swept.count {
+            time.moving_s += motion.ramp_us() as f64 / 1e6;
+        }
+        time
     }
 
     /// The whole, seconds.
@@ -96,7 +124,7 @@ impl Prediction {
                 _ => prediction.checking_s += time.dwelling_s,
             }
             prediction.travel(rig, here, step);
-            here = step.counts;
+            here = step.rests_at(rig);
         }
         prediction
     }
@@ -105,7 +133,8 @@ impl Prediction {
         let via = step.via.unwrap_or(step.counts);
         for (i, axis) in rig.axes.iter().enumerate() {
             let leg = |a: i32, b: i32| (f64::from(a) - f64::from(b)).abs();
-            let counts = leg(from.0[i], via.0[i]) + leg(via.0[i], step.counts.0[i]);
+            let mut counts = leg(from.0[i], via.0[i]) + leg(via.0[i], step.counts.0[i]);
+            counts += leg(step.counts.0[i], step.rests_at(rig).0[i]);
             self.travel[i] += axis.position(counts);
         }
     }
@@ -128,7 +157,7 @@ impl TimeLeft {
     pub fn of(rig: &Rig, steps: &[Step]) -> Self {
         let mut from_step_s = vec![0.0; steps.len() + 1];
         for (i, step) in steps.iter().enumerate().rev() {
-            let from = if i == 0 { Latched([0; 4]) } else { steps[i - 1].counts };
+            let from = if i == 0 { Latched::ZERO } else { steps[i - 1].rests_at(rig) };
             from_step_s[i] = from_step_s[i + 1] + StepTime::of(rig, from, step).total_s();
         }
         Self { from_step_s }

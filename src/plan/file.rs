@@ -26,6 +26,7 @@ const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
 const STEP_DEG: Bounds = Bounds::between(0.001, 360.0);
 /// The wire's dwell is a 32-bit count of microseconds; an hour is well inside.
 const DWELL_MS: Bounds = Bounds::between(0.01, 3_600_000.0);
+const SPEED_DEG_PER_S: Bounds = Bounds::positive_up_to(1e5);
 const SECONDS: Bounds = Bounds::positive_up_to(1e7);
 /// Relative tolerances, not percentages.
 const RELATIVE: Bounds = Bounds::positive_up_to(1.0);
@@ -57,8 +58,9 @@ impl Plan {
         let (name, rig, scene) = (read_name(&root)?, text("rig")?, text("scene")?);
         let region = read_region(root.required_table("region")?)?;
         let sample = root.table("sample")?.map(|table| read_sample(table, &region)).transpose()?;
-        let (schedule, order, repeat) = read_schedule(root.required_table("schedule")?)?;
+        let (schedule, order, repeat, window) = read_schedule(root.required_table("schedule")?)?;
         let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
+        let dwell = window.unwrap_or(dwell);
         let dark = read_dark(root.required_table("dark")?, dwell)?;
         let reference = read_reference(root.table("reference")?, &region, dwell)?;
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
@@ -171,21 +173,26 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// `[schedule]`: `kind`, and after it
 /// raster: `x_count`, `y_count`, `theta_step_deg`, `phi_step_deg` ·
 /// cgamma: `x_count`, `y_count`, `c_step_deg`, `gamma_step_deg` ·
-/// low-discrepancy: `count` · list: `file`.
+/// low-discrepancy: `count` · list: `file` ·
+/// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_deg`, the full width at half maximum of
+/// the narrowest feature that is looked for, or `speed_deg_per_s`; `window_ms` (default:
+/// `dwell.dwell_ms`). Sweeps have their own order.
 /// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
-fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32), Problem> {
+fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32, Option<Duration>), Problem> {
     #[derive(Clone, Copy)]
     enum Kind {
         CGamma,
         List,
         LowDiscrepancy,
         Raster,
+        Sweep,
     }
     let words = [
         ("raster", Kind::Raster),
         ("cgamma", Kind::CGamma),
         ("low-discrepancy", Kind::LowDiscrepancy),
         ("list", Kind::List),
+        ("sweep", Kind::Sweep),
     ];
     let count = |key: &str| read_count(&table, key, COUNT_MAX);
     let step = |key: &str| table.required_number(key, STEP_DEG);
@@ -204,12 +211,39 @@ fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32), Problem> {
         },
         Kind::LowDiscrepancy => Schedule::LowDiscrepancy { count: count("count")? },
         Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
+        Kind::Sweep => read_sweep(&table)?,
     };
+    if let Schedule::Sweep { .. } = schedule {
+        let window = table.number("window_ms", DWELL_MS)?.map(millis);
+        let repeat = table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole);
+        table.finish()?;
+        return Ok((schedule, Order::Listed, repeat, window));
+    }
     let orders = [("travel", Order::Travel), ("listed", Order::Listed)];
     let order = table.choice("order", &orders)?.unwrap_or(Order::Travel);
     let repeat = table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole);
     table.finish()?;
-    Ok((schedule, order, repeat))
+    Ok((schedule, order, repeat, None))
+}
+
+fn read_sweep(table: &Table<'_>) -> Result<Schedule, Problem> {
+    let schedule = Schedule::Sweep {
+        x_count: read_count(table, "x_count", COUNT_MAX)?,
+        y_count: read_count(table, "y_count", COUNT_MAX)?,
+        phi_step_deg: read_turn_step(table, "phi_step_deg")?,
+        speed_deg_per_s: table.number("speed_deg_per_s", SPEED_DEG_PER_S)?,
+        narrowest_deg: table.number("narrowest_deg", STEP_DEG)?,
+    };
+    if let Schedule::Sweep { speed_deg_per_s: None, narrowest_deg: None, .. } = schedule {
+        return Err(table.problem(
+            "narrowest_deg",
+            "nothing says how fast to sweep",
+            "narrowest_deg, the full width at half maximum of the narrowest feature that is looked \
+             for, or speed_deg_per_s",
+            "state narrowest_deg: the speed follows from it, and from the beam",
+        ));
+    }
+    Ok(schedule)
 }
 
 /// A step that goes round a whole number of times, so that the last gap equals the others.

@@ -29,7 +29,8 @@ pub(super) fn poses(schedule: &Schedule, region: &Region) -> Vec<Pose> {
                 turn(c_step_deg).map(|c_deg| wrap_deg(0.0 - c_deg).to_radians()).collect();
             tensor(&places, &phis, &thetas(gamma_step_deg, region))
         }
-        Schedule::List { .. } => Vec::new(),
+        // Sweeps have their poses from the rig's counts.
+        Schedule::List { .. } | Schedule::Sweep { .. } => Vec::new(),
         Schedule::LowDiscrepancy { count } => (0..count).map(|i| evenly(i, region)).collect(),
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             let places = places(region, x_count, y_count);
@@ -51,7 +52,7 @@ pub(super) fn count(schedule: &Schedule, region: &Region) -> u64 {
         Schedule::CGamma { x_count, y_count, c_step_deg, gamma_step_deg } => {
             grid(x_count, y_count, gamma_step_deg, c_step_deg)
         }
-        Schedule::List { .. } => 0,
+        Schedule::List { .. } | Schedule::Sweep { .. } => 0,
         Schedule::LowDiscrepancy { count } => u64::from(count),
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             grid(x_count, y_count, theta_step_deg, phi_step_deg)
@@ -73,7 +74,7 @@ fn tensor(places: &[(f64, f64)], phis: &[f64], thetas: &[f64]) -> Vec<Pose> {
 }
 
 /// Columns of places, x first; one column or row stands in the middle, more reach the edges.
-fn places(region: &Region, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
+pub(super) fn places(region: &Region, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
     let ys = spread(region.y_m, y_count);
     let column = |x_m: f64| ys.iter().map(move |&y_m| (x_m, y_m));
     spread(region.x_m, x_count).into_iter().flat_map(column).collect()

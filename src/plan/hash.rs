@@ -81,6 +81,13 @@ impl Fnv {
         let is_closed = step.shutter == Shutter::Closed;
         self.bytes(&[step.gain, u8::from(is_closed), u8::from(step.source_off)]);
         self.number(step.dwell.as_secs_f64());
+        if let Some(swept) = step.swept {
+            for counts in swept.travel.0 {
+                self.bytes(&counts.to_le_bytes());
+            }
+            self.integer(u64::from(step.id - swept.first));
+            self.number(swept.lead.as_secs_f64());
+        }
     }
 
     fn number(&mut self, number: f64) {

@@ -10,8 +10,9 @@ use firmware_protocol::Shutter;
 use spanned_toml::{Problem, Source};
 
 use super::order::{self, Visit};
+use super::sweep::{self, Line};
 use super::{
-    DarkMethod, Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, Step,
+    DarkMethod, Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, Step, Swept,
     TARGETS_MAX, Target, grid, list,
 };
 use crate::rig::{AxisPositions, Latched, LimitError, Pose, ReadingKind, Rig};
@@ -34,6 +35,9 @@ impl Plan {
         let gain = self.gain_on(rig)?;
         self.check_dwells(rig)?;
         let reference = self.reference_on(rig)?;
+        if let Schedule::Sweep { .. } = self.schedule {
+            return self.lay_out_sweeps(rig, gain, reference);
+        }
         let poses = self.poses(list)?;
         self.check_readings(poses.poses.len())?;
         let candidates = self.candidates(rig, &poses)?;
@@ -44,6 +48,18 @@ impl Plan {
         let targets = targets(&poses.poses, &visits);
         let mut builder = Builder { plan: self, rig, gain, reference, steps: Vec::new() };
         builder.fill(&targets, &visits);
+        let prediction = Prediction::of(rig, &targets, &builder.steps);
+        let (steps, reference) = (builder.steps, builder.reference);
+        let reference = step(0, ReadingKind::Reference, reference, gain, self.reference.dwell);
+        Ok(Sequence { targets, steps, prediction, reference })
+    }
+
+    fn lay_out_sweeps(&self, rig: &Rig, gain: u8, reference: Place) -> Result<Sequence, Problem> {
+        let lines = sweep::lines(self, rig)?;
+        let targets = sweep::targets(rig, &lines);
+        self.check_readings(targets.len())?;
+        let mut builder = Builder { plan: self, rig, gain, reference, steps: Vec::new() };
+        builder.fill_sweeps(&targets, &lines);
         let prediction = Prediction::of(rig, &targets, &builder.steps);
         let (steps, reference) = (builder.steps, builder.reference);
         let reference = step(0, ReadingKind::Reference, reference, gain, self.reference.dwell);
@@ -169,7 +185,14 @@ impl Plan {
     }
 
     /// A problem at a key of a table, or as near to it as the file has anything.
-    fn problem(&self, table: &str, key: &str, what: &str, expected: &str, help: &str) -> Problem {
+    pub(super) fn problem(
+        &self,
+        table: &str,
+        key: &str,
+        what: &str,
+        expected: &str,
+        help: &str,
+    ) -> Problem {
         let root = self.document().root();
         match root.table(table) {
             Ok(Some(table)) => table.problem(key, what, expected, help),
@@ -251,6 +274,61 @@ impl Builder<'_> {
         }
     }
 
+    /// As [`Self::fill`], sweep by sweep: what is due in between comes after a sweep.
+    fn fill_sweeps(&mut self, targets: &[Target], lines: &[Line]) {
+        self.dark();
+        self.reference();
+        let is_due = |before: u64, after: u64, every: u32| {
+            before / u64::from(every) != after / u64::from(every)
+        };
+        let all: u64 = lines.iter().map(|line| u64::from(line.windows)).sum();
+        let last = all * u64::from(self.plan.repeat);
+        let mut visited = 0;
+        for repeat in 0..self.plan.repeat {
+            for place in 0..lines.len() {
+                let line = if repeat % 2 == 0 {
+                    lines[place]
+                } else {
+                    lines[lines.len() - 1 - place].turned(self.rig)
+                };
+                self.windows(targets, &line, repeat);
+                let before = visited;
+                visited += u64::from(line.windows);
+                if is_due(before, visited, self.plan.reference.every) || visited == last {
+                    self.reference();
+                }
+                if is_due(before, visited, self.plan.dark.every) || visited == last {
+                    self.dark();
+                }
+            }
+        }
+    }
+
+    /// The windows of one sweep.
+    fn windows(&mut self, targets: &[Target], line: &Line, repeat: u32) {
+        let first = u32::try_from(self.steps.len()).unwrap_or(u32::MAX);
+        let flight = line.flight;
+        let (travel, lead) = (flight.travel, flight.lead);
+        let swept = Swept { first, count: line.windows.into(), travel, lead };
+        let route = self.rig.flight(flight).ok().map(|motion| {
+            let from = self.steps.last().map_or(Latched::ZERO, |step| step.rests_at(self.rig));
+            self.rig.route_to_flight(from, flight, &motion)
+        });
+        for window in 0..line.windows {
+            let Some(target) = targets.get(line.target(window) as usize) else { continue };
+            let counts = flight.from.plus(travel, window.into());
+            let place = Place { pose: Some(target.pose), positions: target.positions, counts };
+            let kind = ReadingKind::Target { index: target.index, repeat };
+            let id = first + u32::from(window);
+            let (via, settle) = match route.filter(|_| window == 0) {
+                Some(route) => (route.via, route.settle),
+                None => (None, Duration::ZERO),
+            };
+            let step = step(id, kind, place, self.gain, self.plan.dwell);
+            self.steps.push(Step { via, settle, swept: Some(swept), ..step });
+        }
+    }
+
     fn target(&mut self, target: &Target, repeat: u32) {
         let positions = target.positions;
         let counts = self.rig.counts(positions);
@@ -266,8 +344,13 @@ impl Builder<'_> {
     /// Where the axes stand already; at home to begin with.
     fn dark(&mut self) {
         let home = AxisPositions([0.0; 4]);
-        let (positions, counts) =
-            self.steps.last().map_or((home, Latched([0; 4])), |step| (step.positions, step.counts));
+        let (positions, counts) = self.steps.last().map_or((home, Latched::ZERO), |step| {
+            if step.swept.is_none() {
+                return (step.positions, step.counts);
+            }
+            let rests = step.rests_at(self.rig);
+            (self.rig.positions(rests), rests)
+        });
         let place = Place { pose: None, positions, counts };
         self.push(ReadingKind::Dark, place, self.plan.dark.dwell);
         if let Some(step) = self.steps.last_mut() {
@@ -279,7 +362,7 @@ impl Builder<'_> {
     }
 
     fn push(&mut self, kind: ReadingKind, place: Place, dwell: Duration) {
-        let from = self.steps.last().map_or(Latched([0; 4]), |step| step.counts);
+        let from = self.steps.last().map_or(Latched::ZERO, |step| step.rests_at(self.rig));
         let route = self.rig.route(from, place.counts);
         // READINGS_MAX is far below 2^32.
         let id = u32::try_from(self.steps.len()).unwrap_or(u32::MAX);
@@ -301,5 +384,6 @@ fn step(id: u32, kind: ReadingKind, place: Place, gain: u8, dwell: Duration) -> 
         dwell,
         shutter: Shutter::Open,
         source_off: false,
+        swept: None,
     }
 }

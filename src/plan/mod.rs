@@ -19,13 +19,16 @@ mod layout_tests;
 mod list;
 mod order;
 mod sequence;
+mod sweep;
+#[cfg(test)]
+mod sweep_tests;
 mod terms;
 mod tree;
 mod wanted;
 
 pub use cost::{Prediction, StepTime, TimeLeft};
 pub use hash::PlanHash;
-pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Target, WARM_UP_IDS_FROM, closing};
+pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};
 pub use terms::{
     Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, WarmUp,
 };

@@ -8,7 +8,7 @@ use std::time::Duration;
 use firmware_protocol::Shutter;
 
 use super::Prediction;
-use crate::rig::{AxisPositions, Latched, Pose, ReadingKind};
+use crate::rig::{AxisPositions, Flight, Latched, Pose, ReadingKind, Rig, comes_to_rest};
 
 /// Readings taken while the source warms up have ids from here on.
 pub const WARM_UP_IDS_FROM: u32 = 0x4000_0000;
@@ -52,6 +52,59 @@ pub struct Step {
     pub shutter: Shutter,
     /// Whether a person must switch the source off before this reading, and on after it.
     pub source_off: bool,
+    /// Of a reading that is taken in flight: the sweep that it is a window of. Its
+    /// [`Step::counts`] are where the window begins, its pose and positions those of its middle.
+    pub swept: Option<Swept>,
+}
+
+/// The sweep that a window belongs to: readings with ids one after the other, each where the one
+/// before it ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Swept {
+    /// The first window's id.
+    pub first: u32,
+    /// How many windows it has.
+    pub count: u32,
+    /// How far the axes go in each, counts.
+    pub travel: Latched,
+    /// At constant speed before the first.
+    pub lead: Duration,
+}
+
+impl Step {
+    /// The flight of this window and `windows` - 1 more.
+    pub fn flight(&self, windows: u16) -> Option<Flight> {
+        let Swept { travel, lead, .. } = self.swept?;
+        Some(Flight { from: self.counts, travel, window: self.dwell, lead, windows })
+    }
+
+    /// The same reading taken at rest, in the middle of its window.
+    #[must_use]
+    pub fn at_rest(self) -> Self {
+        let Some(swept) = self.swept else { return self };
+        let half = Latched(swept.travel.0.map(|counts| counts / 2));
+        Self { counts: self.counts.plus(half, 1), swept: None, ..self }
+    }
+
+    /// Whether it is the next window of the same sweep.
+    pub fn continues(&self, before: &Self) -> bool {
+        self.swept.is_some_and(|swept| {
+            before.swept == Some(swept) && before.id + 1 == self.id && before.gain == self.gain
+        })
+    }
+
+    /// Where the axes are when it has its reading, counts: in flight, or at rest.
+    pub fn ends_at(&self) -> Latched {
+        self.swept.map_or(self.counts, |swept| self.counts.plus(swept.travel, 1))
+    }
+
+    /// Where the axes come to rest after it, if it is the last window of its sweep or none.
+    pub fn rests_at(&self, rig: &Rig) -> Latched {
+        let is_last = |swept: &Swept| self.id + 1 == swept.first + swept.count;
+        let motion = self.swept.filter(is_last).and(self.flight(1));
+        let motion = motion.and_then(|flight| rig.flight(flight).ok());
+        motion.map_or_else(|| self.ends_at(), |motion| comes_to_rest(&motion))
+    }
 }
 
 /// Every reading of a plan on a rig.
@@ -67,6 +120,25 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// The highest speed at which readings are taken in flight, units a second, in the order of
+    /// [`crate::rig::AXES`]; zeros where all are taken at rest.
+    pub fn speeds(&self, rig: &Rig) -> [f64; 4] {
+        let mut speeds = [0.0_f64; 4];
+        for (step, swept) in self.steps.iter().filter_map(|step| Some((step, step.swept?))) {
+            for ((speed, axis), counts) in speeds.iter_mut().zip(&rig.axes).zip(swept.travel.0) {
+                let units = axis.position(f64::from(counts)).abs();
+                *speed = speed.max(units / step.dwell.as_secs_f64());
+            }
+        }
+        speeds
+    }
+
+    /// How many sweeps there are.
+    pub fn sweeps(&self) -> usize {
+        let is_first = |step: &&Step| step.swept.is_some_and(|swept| swept.first == step.id);
+        self.steps.iter().filter(is_first).count()
+    }
+
     /// The n-th reading while the source warms up: at the reference pose, outside the sequence.
     pub fn warm_up(&self, n: u32) -> Step {
         let id = WARM_UP_IDS_FROM.saturating_add(n).min(RESUME_IDS_FROM - 1);

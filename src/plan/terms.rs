@@ -94,6 +94,19 @@ pub enum Schedule {
         /// Between meridians, degrees.
         phi_step_deg: f64,
     },
+    /// Sweeps of the arm along meridians, readings taken in flight.
+    Sweep {
+        /// Columns of places on the sample.
+        x_count: u32,
+        /// Rows.
+        y_count: u32,
+        /// Between meridians, degrees.
+        phi_step_deg: f64,
+        /// The arm's speed, degrees a second; as fast as the narrowest feature bears if absent.
+        speed_deg_per_s: Option<f64>,
+        /// Full width at half maximum of the narrowest feature that is looked for, degrees.
+        narrowest_deg: Option<f64>,
+    },
 }
 
 /// The order of the visits.

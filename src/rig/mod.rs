@@ -20,6 +20,7 @@ pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
 pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
+pub use motion::{Flight, comes_to_rest, set_out};
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
 pub use reading::{Latched, Reading, ReadingKind};
 

@@ -23,7 +23,18 @@ pub enum ReadingKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Latched(pub [i32; 4]);
 
-/// One dwell as the device reported it.
+impl Latched {
+    /// Nowhere, and at home.
+    pub const ZERO: Self = Self([0; 4]);
+
+    /// These counts further, `times` over.
+    #[must_use]
+    pub fn plus(self, travel: Self, times: i32) -> Self {
+        Self(std::array::from_fn(|i| self.0[i].saturating_add(travel.0[i].saturating_mul(times))))
+    }
+}
+
+/// One dwell, or one window of a sweep, as the device reported it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// Its name in the plan's sequence ([`crate::plan::Step::id`]); the journal holds each once.
@@ -44,8 +55,11 @@ pub struct Reading {
     pub max: i32,
     /// How many stood at an end of the ADC's range.
     pub saturated: u32,
-    /// Setpoints, counts.
+    /// Setpoints when the integration began, counts.
     pub commanded: Latched,
+    /// How far the setpoints went at constant speed while it lasted, counts: zero at rest, and in
+    /// a sweep what a window goes.
+    pub travel: Latched,
     /// Encoders when the integration began.
     pub start: Latched,
     /// Encoders when it ended.

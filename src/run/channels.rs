@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use firmware_protocol::{AxisCounts, AxisMask};
+use firmware_protocol::{AxisCounts, AxisMask, SweepMotion};
 
-use crate::rig::{Approach, Latched, Rig, Route};
+use crate::rig::{Approach, Flight, Latched, Rig, Route, set_out};
 
 /// A device has one channel an axis: [`crate::device::check_identity`] saw to that.
 pub(super) fn to_channels(rig: &Rig, counts: Latched) -> AxisCounts {
@@ -32,13 +32,25 @@ pub(super) fn all_axes(rig: &Rig) -> AxisMask {
 /// The way to a pose; from `None`, which is nobody knows where, every axis may come from its
 /// wrong side.
 pub(super) fn route(rig: &Rig, from: Option<Latched>, to: Latched) -> Route {
-    let worst = || {
-        Latched(std::array::from_fn(|i| match rig.axes[i].approach {
-            Approach::Negative => to.0[i].saturating_sub(1),
-            Approach::Either | Approach::Positive => to.0[i].saturating_add(1),
-        }))
-    };
-    rig.route(from.unwrap_or_else(worst), to)
+    rig.route(from.unwrap_or_else(|| wrong_sides(rig, to)), to)
+}
+
+/// The way to where a flight sets out; from `None` as for [`route`].
+pub(super) fn route_to_flight(
+    rig: &Rig,
+    from: Option<Latched>,
+    flight: Flight,
+    motion: &SweepMotion,
+) -> Route {
+    rig.route_to_flight(from.unwrap_or_else(|| wrong_sides(rig, set_out(motion))), flight, motion)
+}
+
+/// Where every axis would come to a place from its wrong side.
+fn wrong_sides(rig: &Rig, to: Latched) -> Latched {
+    Latched(std::array::from_fn(|i| match rig.axes[i].approach {
+        Approach::Negative => to.0[i].saturating_sub(1),
+        Approach::Either | Approach::Positive => to.0[i].saturating_add(1),
+    }))
 }
 
 /// Whole microseconds, as they go over the wire.

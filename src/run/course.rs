@@ -9,7 +9,7 @@ use super::job::Job;
 use super::pace::Pace;
 use super::state::State;
 use crate::plan::{Step, StepTime, WARM_UP_IDS_FROM, closing};
-use crate::rig::{Latched, Reading, Rig};
+use crate::rig::{Latched, Rig};
 
 /// See the module.
 #[derive(Debug, Clone)]
@@ -80,10 +80,10 @@ impl Course {
     }
 
     /// A step has its reading, which ended at `end_s`.
-    pub(super) fn take(&mut self, step: &Step, reading: &Reading, end_s: f64) {
+    pub(super) fn take(&mut self, step: &Step, end_s: f64) {
         if step.id < WARM_UP_IDS_FROM {
             self.progress.done += 1;
-            self.pace.step(&self.rig, step, reading, end_s);
+            self.pace.step(&self.rig, step, end_s);
         } else {
             self.pace.interrupt(end_s);
         }
@@ -98,7 +98,7 @@ impl Course {
         }
         let times = ahead.iter().chain(&self.closing).map(|step| {
             let time = StepTime::of(&self.rig, here, step);
-            here = step.counts;
+            here = step.rests_at(&self.rig);
             time.total_s()
         });
         let is_late = self.progress.rig_s + times.sum::<f64>() >= self.rig_s_max;

@@ -6,14 +6,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use firmware_protocol::{CommandId, Identity, Instant, Reply, RequestType, Status};
+use firmware_protocol::{CommandId, Event, Instant, Reply, RequestType};
 use tokio::sync::{mpsc, watch};
 
 use super::clock::RunClock;
 use super::course::Course;
 use super::desk::{Desk, Order};
 use super::events::{Happening, Progress};
-use super::hardware::{Hardware, ReachError};
+use super::hardware::{Hardware, ReachError, Reached};
 use super::job::{Check, Ended, Job};
 use super::machine::{Action, Connected, Input, Machine, Program, Setup, Taken, Wish};
 use super::reading::{Taking, reading};
@@ -215,12 +215,13 @@ impl<'a> Engine<'a> {
             }
         };
         match reached {
-            Ok((identity, status)) => self.connected(&identity, &status),
+            Ok(reached) => self.connected(&reached),
             Err(error) => self.unreached(&error),
         }
     }
 
-    fn connected(&mut self, identity: &Identity, status: &Status) {
+    fn connected(&mut self, reached: &Reached) {
+        let Reached { identity, status, windows } = reached;
         let now = self.now();
         self.unreached = None;
         match self.boot_id.replace(identity.boot_id) {
@@ -243,6 +244,7 @@ impl<'a> Engine<'a> {
             homed: status.homed,
             last_id: status.last_id,
             fault: status.fault,
+            windows: *windows,
         };
         self.machine.handle(now, Input::Connected(connected));
     }
@@ -275,12 +277,18 @@ impl<'a> Engine<'a> {
                 Reply::Rejected(_, why) if request == RequestType::ClearFault => {
                     Input::ClearRefused(why)
                 }
+                Reply::Rejected(id, _) if request == RequestType::FetchWindow => {
+                    Input::WindowGone(id)
+                }
                 Reply::Rejected(id, why) => Input::Rejected(id, why),
+                Reply::Fetched(window) => Input::Event(Event::Window(window)),
                 Reply::Stopping => Input::Stopping,
                 Reply::Cleared => Input::Cleared,
-                Reply::Acknowledged(_) | Reply::Alive | Reply::Identity(_) | Reply::Status(_) => {
-                    return;
-                }
+                Reply::Acknowledged(_)
+                | Reply::Alive
+                | Reply::Capabilities(_)
+                | Reply::Identity(_)
+                | Reply::Status(_) => return,
             },
         };
         let now = self.now();
@@ -364,9 +372,10 @@ impl<'a> Engine<'a> {
         if step.id >= RESUME_IDS_FROM {
             self.checked.push(reading.clone());
         }
-        self.course.take(&step, &reading, end_s);
+        self.course.take(&step, end_s);
         let met = self.rule.as_mut().and_then(|rule| rule.show(&reading));
-        let is_late = self.course.is_late(reading.commanded, &self.machine.steps_ahead());
+        let here = step.rests_at(&self.hardware.rig);
+        let is_late = self.course.is_late(here, &self.machine.steps_ahead());
         self.desk.tell(Happening::Reading(Box::new(reading)));
         self.tell_progress();
         if let Some(text) = met {

@@ -157,6 +157,7 @@ impl Hand<'_> {
             dwell: one.dwell,
             shutter: one.shutter,
             source_off: false,
+            swept: None,
         };
         let taking = Taking {
             session: 0,
@@ -175,7 +176,7 @@ impl Hand<'_> {
         };
         let status = match status {
             Some(status) => status,
-            None => self.hardware.reach().await?.1,
+            None => self.hardware.reach().await?.status,
         };
         let is_homed = self.is_homed(&status);
         self.desk.tell(Happening::Position(if is_homed {
@@ -195,7 +196,7 @@ impl Hand<'_> {
     /// Opens a session, and leaves whatever the device stands still for: driving by hand is an
     /// explicit act. The next command's number, and the device's state.
     async fn begin(&mut self) -> Result<(CommandId, Status), HandError> {
-        let (_, status) = self.hardware.reach().await?;
+        let status = self.hardware.reach().await?.status;
         if status.fault.is_some() {
             let native = self.native()?;
             native.submit(Request::ClearFault);

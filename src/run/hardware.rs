@@ -28,6 +28,17 @@ pub enum ReachError {
     Disagrees(#[from] Disagreement),
 }
 
+/// A device that answers.
+#[derive(Debug, Clone)]
+pub(super) struct Reached {
+    /// Who it is.
+    pub(super) identity: Identity,
+    /// How it is.
+    pub(super) status: Status,
+    /// The most windows that a sweep of it can have; 0: it can't sweep.
+    pub(super) windows: u16,
+}
+
 /// See the module.
 pub(super) struct Hardware {
     pub(super) rig: Arc<Rig>,
@@ -43,14 +54,15 @@ impl Hardware {
 
     /// Opens a session: over the link that there is, because opening a port resets some boards;
     /// or else over a new one.
-    pub(super) async fn reach(&mut self) -> Result<(Identity, Status), ReachError> {
+    pub(super) async fn reach(&mut self) -> Result<Reached, ReachError> {
         if let Some(mut native) = self.native.take()
             && let Ok(identity) = native.identify(PATIENCE).await
             && let Ok(status) = native.status().await
+            && let Ok(windows) = native.windows(&identity).await
         {
             check_agreement(&identity, &self.rig)?;
             self.native = Some(native);
-            return Ok((identity, status));
+            return Ok(Reached { identity, status, windows });
         }
         let link = (self.opener)().await?;
         self.session = self.session.wrapping_add(SESSION_STRIDE);
@@ -58,8 +70,9 @@ impl Hardware {
         let (mut native, identity) = Native::connect(link, self.session, baud, PATIENCE).await?;
         check_agreement(&identity, &self.rig)?;
         let status = native.status().await?;
+        let windows = native.windows(&identity).await?;
         self.native = Some(native);
-        Ok((identity, status))
+        Ok(Reached { identity, status, windows })
     }
 
     /// Lets go of the link, after stopping what may move.

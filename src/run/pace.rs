@@ -4,7 +4,7 @@
 //! It has no clock: run time is handed in.
 
 use crate::plan::{Prediction, Step, StepTime, TimeLeft};
-use crate::rig::{Latched, Reading, Rig};
+use crate::rig::{Latched, Rig};
 
 /// Steps after which the prediction is scaled by what was measured.
 const STEPS_MIN: u32 = 5;
@@ -48,14 +48,14 @@ impl Pace {
     }
 
     /// A step has its reading, which ended at `end_s`.
-    pub(super) fn step(&mut self, rig: &Rig, step: &Step, reading: &Reading, end_s: f64) {
+    pub(super) fn step(&mut self, rig: &Rig, step: &Step, end_s: f64) {
         self.done += 1;
         if let Some((from, since_s)) = self.last {
             self.measured_s += end_s - since_s;
             self.predicted_s += StepTime::of(rig, from, step).total_s();
             self.steps += 1;
         }
-        self.last = Some((reading.commanded, end_s));
+        self.last = Some((step.rests_at(rig), end_s));
         self.since_s = end_s;
     }
 

@@ -41,6 +41,7 @@ pub(super) fn reading(rig: &Rig, step: &Step, result: &DwellResult, taking: Taki
         max: result.max,
         saturated: result.saturated,
         commanded: step.counts,
+        travel: step.swept.map_or(Latched::ZERO, |swept| swept.travel),
         start,
         end: to_axes(rig, &result.end),
         start_us,

@@ -291,6 +291,7 @@ mod tests {
             max: 1,
             saturated: 0,
             commanded: Latched([0; 4]),
+            travel: Latched([0; 4]),
             start: Latched([0; 4]),
             end: Latched([0; 4]),
             start_us: i64::from(id % 1000) * 1_000_000,
@@ -334,6 +335,7 @@ mod tests {
             dwell: std::time::Duration::from_millis(50),
             shutter: firmware_protocol::Shutter::Open,
             source_off: false,
+            swept: None,
         };
         let steps: Vec<_> = (0..6).map(step).collect();
         let had = [0, 1, 3, WARM_UP_IDS_FROM + 4, RESUME_IDS_FROM + 2];

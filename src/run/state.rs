@@ -238,6 +238,13 @@ fn describe_rejection(rejection: Rejection, f: &mut fmt::Formatter<'_>) -> fmt::
             write!(f, "channel {channel}: the device refused to move before homing")
         }
         Rejection::Unsupported => f.write_str("the device can't do what was asked"),
+        Rejection::TooFast(channel) => {
+            write!(f, "channel {channel}: the device refused a sweep as faster than it can move")
+        }
+        Rejection::TooManyWindows(most) => {
+            write!(f, "the device keeps {most} windows, and was asked for a sweep with more")
+        }
+        Rejection::NoSuchWindow => f.write_str("the device has forgotten a window"),
     }
 }
 

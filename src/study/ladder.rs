@@ -55,6 +55,15 @@ impl Rung {
             Schedule::LowDiscrepancy { count } => {
                 Schedule::LowDiscrepancy { count: scaled_count(count, self.density) }
             }
+            Schedule::Sweep { x_count, y_count, phi_step_deg, speed_deg_per_s, narrowest_deg } => {
+                Schedule::Sweep {
+                    x_count,
+                    y_count,
+                    phi_step_deg: finer_turn(phi_step_deg),
+                    speed_deg_per_s: speed_deg_per_s.map(|speed| speed / finer),
+                    narrowest_deg: narrowest_deg.map(finer_step),
+                }
+            }
             list @ Schedule::List { .. } => list,
         };
         if plan.list_file().is_none() {

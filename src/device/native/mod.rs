@@ -22,6 +22,9 @@ use pump::Pump;
 /// Why a link says nothing more after it hung up.
 const GONE: &str = "the link is closed";
 
+/// The minor version of the protocol that brought sweeps.
+const SWEEPS_SINCE: u8 = 1;
+
 /// What a device has to say, or what became of the link to it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeviceEvent {
@@ -241,17 +244,40 @@ impl Native {
     pub async fn status(&mut self) -> Result<Status, ConnectError> {
         self.submit(Request::ReadStatus);
         loop {
+            if let Reply::Status(status) = self.answer().await? {
+                return Ok(status);
+            }
+        }
+    }
+
+    /// The next reply.
+    async fn answer(&mut self) -> Result<Reply, ConnectError> {
+        loop {
             let (port, baud) = (self.name.clone(), self.baud);
             let detail = match self.next_event().await {
-                DeviceEvent::Reply { reply: Reply::Status(status), .. } => return Ok(status),
+                DeviceEvent::Reply { reply, .. } => return Ok(reply),
                 DeviceEvent::LinkLost(LinkLost::HungUp { port, detail }) => {
                     return Err(ConnectError::HungUp { port, detail });
                 }
                 DeviceEvent::LinkLost(lost) => lost.to_string(),
                 DeviceEvent::Restarted { .. } => "it restarted".to_owned(),
-                DeviceEvent::Reply { .. } | DeviceEvent::Event(_) => continue,
+                DeviceEvent::Event(_) => continue,
             };
             return Err(ConnectError::Noisy { port, baud, detail });
+        }
+    }
+
+    /// The most windows that a sweep of this device can have; 0 where it can't sweep, as no device
+    /// of version 1.0 can. What the device says before the answer is lost.
+    pub async fn windows(&mut self, identity: &Identity) -> Result<u16, ConnectError> {
+        if identity.protocol.1 < SWEEPS_SINCE {
+            return Ok(0);
+        }
+        self.submit(Request::Capabilities);
+        loop {
+            if let Reply::Capabilities(capabilities) = self.answer().await? {
+                return Ok(capabilities.windows);
+            }
         }
     }
 

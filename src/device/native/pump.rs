@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use firmware_protocol::{
     CommandId, Dwell, Event, Home, HostEndpoint, HostEvent, Instant, LinkStatistics, MoveTo, Reply,
-    Request, RequestType, frame,
+    Request, RequestType, Sweep, frame,
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::sync::{mpsc, watch};
@@ -151,7 +151,8 @@ impl Pump {
             Order::Send(request) => {
                 if let Request::Dwell(Dwell { id, .. })
                 | Request::Home(Home { id, .. })
-                | Request::MoveTo(MoveTo { id, .. }) = &request
+                | Request::MoveTo(MoveTo { id, .. })
+                | Request::Sweep(Sweep { id, .. }) = &request
                 {
                     self.open_commands.insert(*id);
                 }
@@ -251,7 +252,7 @@ impl Pump {
 
     fn end(&mut self, event: &Event) {
         let id = match event {
-            Event::Started(..) => return,
+            Event::Started(..) | Event::Window(_) => return,
             Event::Done(done) => done.id,
             Event::Sampled(result) => result.id,
             Event::Failed(id, ..) => *id,

@@ -128,7 +128,7 @@ impl Rig {
         for (i, axis) in self.axes.iter().enumerate() {
             if axis.readback == Readback::None {
                 start.0[i] = reading.commanded.0[i];
-                end.0[i] = reading.commanded.0[i];
+                end.0[i] = reading.commanded.0[i].saturating_add(reading.travel.0[i]);
             }
         }
         if start == end {

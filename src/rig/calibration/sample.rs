@@ -57,7 +57,8 @@ pub enum Flag {
     Saturated,
     /// |value| is less than twice its uncertainty.
     BelowNoise,
-    /// An axis was not settled when the dwell began, or moved while it lasted.
+    /// An axis was not settled when the dwell began, or moved while it lasted; in a sweep, one
+    /// was not where it should be, or did not go as far as it should.
     Unsettled,
     /// The reference readings before and after it differ by more than three times the standard
     /// uncertainty of their difference, noise alone.
@@ -204,8 +205,9 @@ pub(super) fn from_reading(rig: &Rig, darks: &[Dark], reading: &Reading) -> Opti
 }
 
 fn moved(rig: &Rig, reading: &Reading) -> bool {
-    rig.axes.iter().zip(reading.start.0.iter().zip(reading.end.0)).any(|(axis, (start, end))| {
-        let counts = end.abs_diff(*start);
+    let ends = reading.start.0.iter().zip(&reading.travel.0).zip(reading.end.0);
+    rig.axes.iter().zip(ends).any(|(axis, ((start, travel), end))| {
+        let counts = end.abs_diff(start.saturating_add(*travel));
         counts > MOVED_COUNTS && axis.position(f64::from(counts)) > MOVED_U * axis.u_readback
     })
 }

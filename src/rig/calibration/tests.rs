@@ -30,6 +30,7 @@ fn reading(rig: &Rig, id: u32, kind: ReadingKind, radiance: f64, dark_a: f64) ->
         max: 0,
         saturated: 0,
         commanded: at,
+        travel: Latched([0; 4]),
         start: at,
         end: at,
         start_us: begin,

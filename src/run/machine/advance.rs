@@ -112,6 +112,12 @@ impl Machine {
                 }
                 return;
             }
+            if self.windows > 0 && self.work.step(index).swept.is_some() {
+                if !self.has_room_for_sweep() || !self.submit_sweep(index) {
+                    return;
+                }
+                continue;
+            }
             if !self.has_room(index) {
                 return;
             }
@@ -132,19 +138,18 @@ impl Machine {
 
     /// The steps that will be measured whatever is decided now, in order, and one more.
     pub fn steps_ahead(&self) -> Vec<Step> {
-        let on_device = self.outstanding.iter().filter_map(|outstanding| match outstanding.what {
-            What::Dwell { index, .. } => Some(index),
-            What::Home | What::Move => None,
-        });
+        let on_device = self.outstanding.iter().flat_map(|outstanding| outstanding.what.indices());
+        let on_device = on_device.filter(|index| !self.work.is_recorded(*index));
         on_device.chain(self.work.next()).map(|index| *self.work.step(index)).collect()
     }
 
     fn dwells(&self) -> usize {
-        self.outstanding.iter().filter(|o| matches!(o.what, What::Dwell { .. })).count()
+        let reads = |o: &&Outstanding| matches!(o.what, What::Dwell { .. } | What::Sweep(_));
+        self.outstanding.iter().filter(reads).count()
     }
 
     fn has_room(&self, index: Index) -> bool {
-        let to = self.work.step(index).counts;
+        let to = self.work.step(index).at_rest().counts;
         let is_there = self.commanded == Some(to);
         let is_straight = || route(&self.setup.rig, self.commanded, to).via.is_none();
         let moves = if is_there { 0 } else { 2 - usize::from(is_straight()) };
@@ -152,7 +157,7 @@ impl Machine {
     }
 
     fn submit(&mut self, now: Instant, index: Index) {
-        let step = *self.work.step(index);
+        let step = self.work.step(index).at_rest();
         let rig = self.setup.rig.clone();
         let mut settle = Duration::ZERO;
         if self.commanded != Some(step.counts) {
@@ -185,7 +190,11 @@ impl Machine {
         self.send(What::Home, |id| Request::Home(Home { id, axes }));
     }
 
-    fn send(&mut self, what: What, request: impl FnOnce(CommandId) -> Request) -> CommandId {
+    pub(super) fn send(
+        &mut self,
+        what: What,
+        request: impl FnOnce(CommandId) -> Request,
+    ) -> CommandId {
         let id = CommandId(self.next_id);
         self.next_id = self.next_id.saturating_add(1);
         self.outstanding.push_back(Outstanding { id, what, is_void: false });
@@ -208,6 +217,7 @@ impl Machine {
         match what {
             What::Home => self.go(State::Homing),
             What::Move => self.go(State::Moving),
+            What::Sweep(_) => self.go(State::Dwelling),
             What::Dwell { .. } => {
                 if self.settling.is_none_or(|(settling, _)| settling != id) {
                     self.note_start(now, id);
@@ -272,10 +282,7 @@ impl Machine {
     /// The device forgets the session that is over, and so do we: what had no result will be
     /// measured again.
     pub(super) fn forget_session(&mut self) {
-        let lost = self.outstanding.drain(..).filter_map(|lost| match lost.what {
-            What::Dwell { index, .. } => Some(index),
-            What::Home | What::Move => None,
-        });
+        let lost = self.outstanding.drain(..).flat_map(|lost| lost.what.indices());
         self.unmeasured.extend(lost);
         self.commanded = None;
         self.settling = None;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use firmware_protocol::{AxisCounts, Done, Shutter, Tick};
+use firmware_protocol::{AxisCounts, Done, Shutter, Sweep, Tick, Window};
 
 use super::*;
 use crate::rig::{Approach, AxisPositions, ReadingKind};
@@ -39,6 +39,7 @@ pub(super) fn step(id: u32, kind: ReadingKind) -> Step {
         dwell: Duration::from_millis(50),
         shutter: Shutter::Open,
         source_off: false,
+        swept: None,
     }
 }
 
@@ -58,6 +59,12 @@ pub(super) struct Device {
     pub(super) upward: VecDeque<Input>,
     pub(super) downward: VecDeque<Request>,
     pub(super) has_moved: bool,
+    /// The most windows of a sweep; 0: it can't sweep.
+    pub(super) windows: u16,
+    /// Readings of windows that are lost on the way, once.
+    pub(super) lost: Vec<u32>,
+    pub(super) kept: Vec<(u32, Window)>,
+    pub(super) sweeps: usize,
 }
 
 pub(super) fn id_of(request: &Request) -> CommandId {
@@ -65,6 +72,7 @@ pub(super) fn id_of(request: &Request) -> CommandId {
         Request::Home(home) => home.id,
         Request::MoveTo(to) => to.id,
         Request::Dwell(dwell) => dwell.id,
+        Request::Sweep(sweep) => sweep.id,
         other => panic!("{other:?} has no number"),
     }
 }
@@ -80,6 +88,7 @@ impl Device {
             homed: AxisMask(if self.homed { AXES.0 } else { 0 }),
             last_id: self.last_id,
             fault: self.latched,
+            windows: self.windows,
         }
     }
 
@@ -88,7 +97,15 @@ impl Device {
         let stop = self.downward.iter().position(|request| *request == Request::Stop);
         let at = stop.filter(|_| stop_overtakes).unwrap_or(0);
         match self.downward.remove(at) {
-            None | Some(Request::Acknowledge(_)) => {}
+            None => {}
+            Some(Request::Acknowledge(id)) => self.kept.retain(|(_, window)| window.id != id),
+            Some(Request::FetchWindow(id, index)) => {
+                let is_it = |window: &Window| window.id == id && window.index == index;
+                let kept = self.kept.iter().find(|(_, window)| is_it(window));
+                self.upward.push_back(kept.map_or(Input::WindowGone(id), |(_, window)| {
+                    Input::Event(Event::Window(window.clone()))
+                }));
+            }
             Some(Request::Stop) => {
                 self.upward.push_back(Input::Stopping);
                 self.stop(Cause::Stopped);
@@ -136,7 +153,7 @@ impl Device {
 
     pub(super) fn restart(&mut self) {
         let (boot_id, ticks) = (self.boot_id + 1, self.ticks);
-        *self = Self { boot_id, ticks, ..Self::default() };
+        *self = Self { boot_id, ticks, windows: self.windows, ..Self::default() };
     }
 
     /// Ends the command that runs.
@@ -169,9 +186,43 @@ impl Device {
                 start_tick: tick,
                 end_tick: tick,
             }),
+            Request::Sweep(sweep) => self.sweep(&sweep),
             other => panic!("{other:?} was queued"),
         };
         self.upward.push_back(Input::Event(event));
+    }
+}
+
+impl Device {
+    fn sweep(&mut self, sweep: &Sweep) -> Event {
+        self.sweeps += 1;
+        let mut start = sweep.from.clone();
+        for index in 0..sweep.windows {
+            let window = Window {
+                id: sweep.id,
+                index,
+                mean: 1e5,
+                variance: 1.0,
+                min: 99_999,
+                max: 100_001,
+                saturated: 0,
+                start: start.clone(),
+                moved: sweep.step.clone(),
+                start_tick: Tick(self.ticks),
+                duration_us: 25_000,
+            };
+            start.0.iter_mut().zip(&sweep.step.0).for_each(|(at, step)| *at += step);
+            self.ticks += 25_000;
+            let reading = sweep.reading + u32::from(index);
+            self.kept.push((reading, window.clone()));
+            if let Some(lost) = self.lost.iter().position(|lost| *lost == reading) {
+                self.lost.remove(lost);
+            } else {
+                self.upward.push_back(Input::Event(Event::Window(window)));
+            }
+        }
+        self.at = start;
+        Event::Done(Done { id: sweep.id, readback: self.at.clone(), tick: Tick(self.ticks) })
     }
 }
 

@@ -11,6 +11,9 @@ mod advance;
 mod bench_tests;
 mod request;
 #[cfg(test)]
+mod sweep_tests;
+mod sweeping;
+#[cfg(test)]
 mod tests;
 mod work;
 
@@ -31,6 +34,7 @@ use super::warm_up::Stability;
 use crate::device::QUEUE_DEPTH_MIN;
 use crate::plan::Step;
 use crate::rig::{Latched, Rig};
+use sweeping::Sweeping;
 use work::{Index, Phase, Work, is_warm_up};
 
 /// How often in a row the device may say that its queue is full before that is a fault.
@@ -78,6 +82,9 @@ pub struct Connected {
     pub last_id: Option<CommandId>,
     /// Its latched fault.
     pub fault: Option<Cause>,
+    /// The most windows that a sweep of it can have; 0: it can't sweep, and what the plan would
+    /// take in flight is taken at rest.
+    pub windows: u16,
 }
 
 /// What happens to a run.
@@ -95,8 +102,10 @@ pub enum Input {
     ClearRefused(Rejection),
     /// The answer to `Stop`.
     Stopping,
-    /// The device said something unasked.
+    /// The device said something unasked, or again what it was asked for.
     Event(Event),
+    /// The device has forgotten a window of this sweep.
+    WindowGone(CommandId),
     /// The checks were judged: go on, or why not.
     Judged(Result<(), String>),
     /// Something outside the machine is wrong: the link, the journal.
@@ -142,6 +151,7 @@ enum What {
     Home,
     Move,
     Dwell { index: Index, settle: Duration },
+    Sweep(Sweeping),
 }
 
 #[derive(Debug)]
@@ -199,6 +209,8 @@ pub struct Machine {
     homed_in: Option<u32>,
     boot_id: u32,
     window: usize,
+    // The most windows that a sweep can have.
+    windows: u16,
     next_id: u32,
     outstanding: VecDeque<Outstanding>,
     // Steps whose commands ended without a reading, to be put back before the next is sent.
@@ -235,6 +247,7 @@ impl Machine {
             homed_in: None,
             boot_id: 0,
             window: 1,
+            windows: 0,
             next_id: 1,
             outstanding: VecDeque::new(),
             unmeasured: Vec::new(),
@@ -307,6 +320,7 @@ impl Machine {
             Input::ClearRefused(rejection) => self.on_clear_refused(rejection),
             Input::Stopping => self.stop_confirmed = true,
             Input::Event(event) => self.on_event(now, event),
+            Input::WindowGone(id) => self.on_window_gone(id),
             Input::Judged(Ok(())) => self.work.end_judging(),
             Input::Judged(Err(why)) => self.stand_still(Fault::ReferenceMoved(why)),
             Input::Fault(fault) => self.stand_still(fault),
@@ -315,12 +329,13 @@ impl Machine {
     }
 
     fn on_connected(&mut self, connected: Connected) {
-        let Connected { boot_id, queue_depth, homed, last_id, fault } = connected;
+        let Connected { boot_id, queue_depth, homed, last_id, fault, windows } = connected;
         let axes = channels::all_axes(&self.setup.rig).0;
         let is_homed = homed.0 & axes == axes;
         self.window = usize::from(queue_depth).max(QUEUE_DEPTH_MIN);
         self.next_id = last_id.map_or(1, |last| last.0.saturating_add(1));
         self.boot_id = boot_id;
+        self.windows = windows;
         self.line = Line::Up;
         self.forget_session();
         self.ticks = TickUnwrapper::default();
@@ -363,9 +378,7 @@ impl Machine {
     fn on_rejected(&mut self, id: CommandId, rejection: Rejection) {
         let Some(refused) = self.end(id) else { return };
         self.void_after(id);
-        if let What::Dwell { index, .. } = refused.what {
-            self.unmeasured.push(index);
-        }
+        self.unmeasured.extend(refused.what.indices());
         if !self.state.is_active() {
             return;
         }
@@ -384,6 +397,8 @@ impl Machine {
     fn on_event(&mut self, now: Instant, event: Event) {
         match event {
             Event::Started(id, _) => self.note_start(now, id),
+            Event::Window(window) => self.on_window(&window),
+            Event::Done(done) if self.is_sweep(done.id) => self.on_swept(done.id),
             Event::Done(done) => {
                 self.acknowledge(done.id);
                 let ended = self.end(done.id);
@@ -402,7 +417,7 @@ impl Machine {
         let id = result.id;
         match self.end(id) {
             Some(Outstanding { what: What::Dwell { index, .. }, is_void: false, .. }) => {
-                let step = *self.work.step(index);
+                let step = self.work.step(index).at_rest();
                 let time_s = self.ticks.unwrap(result.end_tick) as f64 * 1e-6;
                 let mean = result.mean;
                 if self.work.record(index) {
@@ -437,7 +452,7 @@ impl Machine {
         let Some(failed) = self.end(id) else { return };
         self.void_after(id);
         match failed.what {
-            What::Dwell { index, .. } => self.unmeasured.push(index),
+            What::Dwell { .. } | What::Sweep(_) => self.unmeasured.extend(failed.what.indices()),
             What::Home => self.trust(Position::Untrusted(Doubt::Upset(cause))),
             What::Move => {}
         }

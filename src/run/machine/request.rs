@@ -13,9 +13,9 @@ pub enum Wish {
     ClearFault,
     /// Go on after a pause, a question or a fault; homes first where the position is not trusted.
     Continue,
-    /// Finish the dwell that runs, and come to rest.
+    /// Finish the dwell or the sweep that runs, and come to rest.
     Pause,
-    /// Finish the dwell that runs, come to rest, and end the run.
+    /// Finish the dwell or the sweep that runs, come to rest, and end the run.
     Stop,
 }
 
@@ -26,7 +26,7 @@ pub enum Answer {
     Continuing,
     /// The run is going on already.
     Running,
-    /// The run will pause after the dwell that runs.
+    /// The run will pause after the dwell or the sweep that runs.
     Pausing,
     /// The run is paused already.
     Paused,
@@ -50,7 +50,7 @@ impl Answer {
         match self {
             Self::Continuing => "continuing",
             Self::Running => "running already",
-            Self::Pausing => "pausing after the dwell that runs",
+            Self::Pausing => "pausing after the dwell or sweep that runs",
             Self::Paused => "paused already",
             Self::Ending => "ending",
             Self::Over => "over already",
@@ -194,9 +194,9 @@ impl Machine {
         }
     }
 
-    /// The dwell that the device is in the middle of, as far as is known.
+    /// The dwell or the sweep that the device is in the middle of, as far as is known.
     fn running_dwell(&self) -> Option<CommandId> {
         let front = self.outstanding.front()?;
-        matches!(front.what, What::Dwell { .. }).then_some(front.id)
+        matches!(front.what, What::Dwell { .. } | What::Sweep(_)).then_some(front.id)
     }
 }

@@ -41,6 +41,13 @@ pub(super) fn is_warm_up(step: &Step) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Index(usize);
 
+impl Index {
+    /// So many further on.
+    pub(super) const fn plus(self, by: usize) -> Self {
+        Self(self.0 + by)
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Work {
     // Every step that was handed out or will be, and whether its reading was taken over.
@@ -116,6 +123,29 @@ impl Work {
     /// The next step of this phase, whether or not it may be handed out.
     pub(super) fn next(&self) -> Option<Index> {
         self.todo.front().copied()
+    }
+
+    /// How many steps from the next one on are windows of one sweep, one after the other; at most
+    /// so many.
+    pub(super) fn windows_ahead(&self, most: u16) -> u16 {
+        let mut windows = 0;
+        let mut before: Option<Index> = None;
+        for index in self.todo.iter().take(most.into()) {
+            let follows = before.is_none_or(|before| {
+                *index == before.plus(1) && self.step(*index).continues(self.step(before))
+            });
+            if !follows {
+                break;
+            }
+            before = Some(*index);
+            windows += 1;
+        }
+        windows
+    }
+
+    /// Whether its reading was taken over.
+    pub(super) fn is_recorded(&self, index: Index) -> bool {
+        self.all[index.0].1
     }
 
     /// Hands out the step that [`Work::peek`] showed.
