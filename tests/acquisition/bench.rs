@@ -49,6 +49,7 @@ pub(crate) fn steps(count: u32) -> Vec<Step> {
                 dwell: Duration::from_millis(50),
                 shutter: Shutter::Open,
                 source_off: false,
+                swept: None,
             }
         })
         .collect()
