@@ -59,6 +59,12 @@ pub(crate) trait Field: fmt::Debug + Send + Sync {
         grid(region)
     }
 
+    /// Rays of a region along which there is a detail that no grid meets for certain: an outline of what
+    /// stands above the plane, or one within an image.
+    fn details(&self, _: &Region) -> Vec<Ray> {
+        Vec::new()
+    }
+
     /// The flat patches on the sample's plane, if they are all that there is to see; they do not
     /// overlap.
     fn patches(&self) -> Option<Vec<Patch>> {
@@ -145,6 +151,9 @@ const PLACES: u32 = 5;
 const POLAR: u32 = 16;
 const AZIMUTHS: u32 = 16;
 
+/// Places on the borders of pixels at most.
+const BORDERS: usize = 400;
+
 /// A grid of rays over a region, its corners and its largest θ included.
 pub(crate) fn grid(region: &Region) -> Vec<Ray> {
     let between =
@@ -174,6 +183,15 @@ impl Field for Scene {
     fn patches(&self) -> Option<Vec<Patch>> {
         let emitters = self.emitters().iter().enumerate();
         emitters.map(|(i, emitter)| Patch::of_emitter(i, emitter)).collect()
+    }
+
+    fn details(&self, region: &Region) -> Vec<Ray> {
+        let emitters = self.emitters().iter();
+        let places = emitters.flat_map(|emitter| emitter.borders_within(region.x_m, region.y_m));
+        let places: Vec<(f64, f64)> = places.collect();
+        let every = places.len().div_ceil(BORDERS).max(1);
+        let places = places.into_iter().step_by(every);
+        places.map(|(x, y)| Ray::new(x, y, 0.0, 0.0)).collect()
     }
 
     fn on_patch(&self, patch: usize, ray: &Ray) -> f64 {

@@ -1,6 +1,8 @@
 //! Rays of a region that tell most of what is seen there: a grid, the places into which shadows may
 //! fall, and the bodies that stand in the way.
 
+use core::f64::consts::TAU;
+
 use glam::DVec3;
 use radiometry::direction::angles;
 use radiometry::projected;
@@ -14,6 +16,9 @@ use crate::scene::Body;
 
 /// Cells along each side of a region, 2 to this power, of which each is asked for shadows.
 const HALVINGS: u32 = 5;
+/// Polar angles and azimuths under which a body is looked at from below.
+const LEANS: u32 = 3;
+const TURNS: u32 = 8;
 /// Steps along each side where nothing is known of shadows.
 const STEPS: u32 = 16;
 
@@ -98,12 +103,13 @@ pub(super) fn shaded(lit: &LitScene, region: &Region) -> Vec<ShadedCell> {
 
 /// Rays through the middle of each raised body and just inside its outline, as far as the region has
 /// them.
-fn towards_bodies(lit: &LitScene, region: &Region) -> Vec<Ray> {
+pub(super) fn towards_bodies(lit: &LitScene, region: &Region) -> Vec<Ray> {
     let mut rays = Vec::new();
     for part in &lit.raised {
         let Body::Raised(solid) = &part.body else { continue };
         for target in solid.points() {
             rays.extend(towards(target, region));
+            rays.extend(under(target, region));
         }
     }
     rays
@@ -121,6 +127,21 @@ fn towards(target: DVec3, region: &Region) -> Vec<Ray> {
         (theta <= region.theta_max_rad).then(|| Ray::new(x, y, theta, phi))
     });
     over.collect()
+}
+
+/// Through a point into directions of the region, from places of it.
+fn under(target: DVec3, region: &Region) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for i in 0..LEANS * TURNS {
+        let theta = region.theta_max_rad * f64::from(i / TURNS) / f64::from(LEANS - 1);
+        let ray = Ray::new(0.0, 0.0, theta, TAU * f64::from(i % TURNS) / f64::from(TURNS));
+        let Some(ray) = Ray::through(target, ray.direction) else { continue };
+        let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+        if within(region.x_m, ray.point.x) && within(region.y_m, ray.point.y) {
+            rays.push(ray);
+        }
+    }
+    rays
 }
 
 fn corners_and_middle(region: &Region) -> [(f64, f64); 5] {

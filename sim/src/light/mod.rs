@@ -233,6 +233,16 @@ impl Field for LitScene {
         landmarks::of(self, region)
     }
 
+    fn details(&self, region: &Region) -> Vec<Ray> {
+        let mut rays = landmarks::towards_bodies(self, region);
+        for part in &self.flat {
+            let Glow::Emits(emitter) = &part.glow else { continue };
+            let places = emitter.borders_within(region.x_m, region.y_m);
+            rays.extend(places.into_iter().map(|(x, y)| Ray::new(x, y, 0.0, 0.0)));
+        }
+        rays
+    }
+
     fn patches(&self) -> Option<Vec<crate::field::Patch>> {
         self.flat_patches()
     }

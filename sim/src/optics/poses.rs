@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 
 use glam::DVec2;
 use radiometry::beam::{Beam, footprint};
+use radiometry::direction::angles;
 
 use crate::Region;
 use crate::compile::Setting;
@@ -15,6 +16,8 @@ const LANDMARKS: usize = 400;
 const ANYWHERE: u32 = 400;
 /// Directions round the normal.
 const AZIMUTHS: u32 = 32;
+/// Parts of the region that a climb begins and ends with.
+const STEPS: (f64, f64) = (0.1, 1e-4);
 /// Polar angles at most.
 const POLAR_MAX: f64 = 400.0;
 
@@ -43,6 +46,36 @@ pub(super) fn anywhere_rays(setting: &Setting<'_>) -> Vec<Ray> {
         rays.push(Ray::new(x, y, theta_max_rad * libm::sqrt(part(3)), TAU * part(4)));
     }
     rays
+}
+
+/// Uphill from a ray within the region, by ever finer steps: the largest that `of` says there.
+pub(super) fn uphill(setting: &Setting<'_>, from: &Ray, of: &dyn Fn(&Ray) -> f64) -> f64 {
+    let Region { x_m, y_m, theta_max_rad } = setting.region;
+    let (theta, phi) = angles(from.direction);
+    let mut at = [from.point.x, from.point.y, theta, phi];
+    let spans = [x_m.1 - x_m.0, y_m.1 - y_m.0, theta_max_rad, TAU / 2.0];
+    let ray = |at: &[f64; 4]| Ray::new(at[0], at[1], at[2], at[3]);
+    let (mut best, mut part) = (of(from), STEPS.0);
+    while part > STEPS.1 {
+        let mut has_risen = false;
+        for (k, span) in spans.iter().enumerate() {
+            for step in [part * span, -part * span] {
+                let mut next = at;
+                next[k] += step;
+                next[0] = next[0].clamp(x_m.0, x_m.1);
+                next[1] = next[1].clamp(y_m.0, y_m.1);
+                next[2] = next[2].clamp(0.0, theta_max_rad);
+                let found = of(&ray(&next));
+                if found > best {
+                    (best, at, has_risen) = (found, next, true);
+                }
+            }
+        }
+        if !has_risen {
+            part /= 3.0;
+        }
+    }
+    best
 }
 
 /// From the region's middle into all its directions, a quarter of the beam's angle apart; into one

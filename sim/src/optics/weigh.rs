@@ -4,7 +4,8 @@
 //! see all or half; exactly 0 where the widest footprint stays within even patches, or off all;
 //! else the largest departure over rays that are spaced by a quarter of the beam's own angle and,
 //! where outlines come near, stand as near to them as the region goes, with a margin; of what goes with
-//! the place, over places and directions of all the region.
+//! the place or has outlines above the plane, over places and directions of all the region, its details
+//! and uphill from there.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use radiometry::beam::Beam;
 
 use super::beams::{ByDirections, Degrees};
 use super::forms::{Form, MARGIN, Off, Seen, choose};
-use super::poses::{across_rays, anywhere_rays, inside_rays, widest_m};
+use super::poses::{across_rays, anywhere_rays, inside_rays, uphill, widest_m};
 use super::{Axis, Optics, PointSampled};
 use crate::Region;
 use crate::compile::Setting;
@@ -21,6 +22,12 @@ use crate::field::{Field, Goes, OfPlace, Patch, Ray};
 
 /// Degrees by which departures are judged.
 const JUDGED: Degrees = Degrees { directions: 9, rays: (9, 3), pupil: 5, chords: (8, 4) };
+/// Degrees over stop and pupil by which departures are sought anywhere, and by which slivers are.
+const COARSE: (usize, usize) = (5, 3);
+const FINE: (usize, usize) = (20, 5);
+/// How many of the worst rays are climbed from, and how many are asked for slivers.
+const CLIMBS: usize = 5;
+const SLIVERS_SOUGHT: usize = 60;
 /// The degree of the pupil's rule that sees slivers of a beam.
 const SLIVERS: usize = 25;
 /// From here on a dozen points of the pupil tell as much.
@@ -45,8 +52,10 @@ impl Weighed {
         let seen = Seen::tabled(setting, &beam);
         let (bound, fact) = match setting.field.patches() {
             Some(patches) => over_patches(setting, &beam, &seen, &patches),
-            // What has outlines anywhere is not looked through.
-            None => (1.0, "what is seen is more than flat patches".to_owned()),
+            None => (
+                anywhere(setting, &beam, &seen),
+                "what is seen, more than flat patches, goes with place and direction".to_owned(),
+            ),
         };
         Self { bound: bound.min(1.0), fact, beam, seen }
     }
@@ -96,9 +105,7 @@ fn over_patches(
             fact = String::from("radiance goes with direction within the beam");
         }
         Some((_, _, Goes::WithPlace | Goes::WithBoth)) => {
-            let point = PointSampled(Arc::clone(&seen.field));
-            let optics = seen.build(*beam, Form::Patches(JUDGED, 0));
-            bound = largest(setting, &*optics, &point, &anywhere_rays(setting));
+            bound = anywhere(setting, beam, seen);
             fact = String::from("radiance goes with the place within the beam");
         }
         Some((_, _, Goes::Even(_))) | None => {}
@@ -109,6 +116,29 @@ fn over_patches(
             format!("the footprint, up to {mm:.1} mm wide, reaches the outline of {}", first.name);
     }
     (bound, fact)
+}
+
+/// The largest departure over all the region, its details and uphill from the worst; of what has outlines
+/// anywhere, with so many rays that a sliver is seen.
+fn anywhere(setting: &Setting<'_>, beam: &Beam, seen: &Seen) -> f64 {
+    let point = PointSampled(Arc::clone(&seen.field));
+    let mut rays = anywhere_rays(setting);
+    rays.extend(setting.field.details(&setting.region));
+    let by = |(stop, pupil)| seen.build(*beam, Form::Rays(stop, pupil));
+    let coarse = by(COARSE);
+    let off = |ray: &Ray| departure(setting, &*coarse, &point, ray);
+    let mut tried: Vec<(f64, &Ray)> = rays.iter().map(|ray| (off(ray), ray)).collect();
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let found = tried.iter().take(CLIMBS).map(|(_, ray)| uphill(setting, ray, &off));
+    let found = found.fold(0.0, f64::max);
+    if found > NO_SLIVER {
+        return MARGIN * found;
+    }
+    let fine = by(FINE);
+    let every = rays.len().div_ceil(SLIVERS_SOUGHT).max(1);
+    let some = tried.iter().take(CLIMBS).chain(tried.iter().step_by(every));
+    let fine = some.map(|(_, ray)| departure(setting, &*fine, &point, ray)).fold(found, f64::max);
+    MARGIN * fine
 }
 
 /// What leaves a patch, as if it had no end.

@@ -255,6 +255,21 @@ impl Emitter {
         }
     }
 
+    /// Places on the borders between pixels of an image, and on its outline, within a rectangle of the
+    /// sample's plane.
+    pub(crate) fn borders_within(&self, xs: (f64, f64), ys: (f64, f64)) -> Vec<(f64, f64)> {
+        let (Some(image), Some(shape)) = (self.texture(), self.shape()) else { return Vec::new() };
+        let ((x0, x1), (y0, y1)) = shape.bounding_box();
+        let sides = (2 * image.columns(), 2 * image.rows());
+        let at = |from: f64, to: f64, i: usize, n: usize| from + (to - from) * i as f64 / n as f64;
+        // Corners of pixels and middles of their sides.
+        let places = (0..=sides.1).flat_map(|k| (0..=sides.0).map(move |i| (i, k)));
+        let on_border = places.filter(|(i, k)| i % 2 == 0 || k % 2 == 0);
+        let places = on_border.map(|(i, k)| (at(x0, x1, i, sides.0), at(y0, y1, k, sides.1)));
+        let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+        places.filter(|(x, y)| within(xs, *x) && within(ys, *y)).collect()
+    }
+
     /// Where it is brightest within a rectangle of the sample's plane: x and y, metres, and its
     /// image's value there, 1 where it has none.
     pub fn brightest_within(&self, xs: (f64, f64), ys: (f64, f64)) -> Option<(f64, f64, f64)> {

@@ -29,8 +29,17 @@ const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-
 pub(super) type Draw = fn(&mut Dice) -> Case;
 
 /// Shadows are tried twice: of a disk and of a ball.
-pub(super) const EFFECTS: [Draw; 7] =
-    [weak_lamp, shadow, shadow, window, lamp_in_beam, beam_shadow, finite_beam];
+pub(super) const EFFECTS: [Draw; 9] = [
+    weak_lamp,
+    shadow,
+    shadow,
+    window,
+    lamp_in_beam,
+    beam_shadow,
+    finite_beam,
+    beam_over_a_panel,
+    beam_past_a_ball,
+];
 
 fn case(effect: &'static str, scene: String) -> Case {
     Case { effect, scene, likely: Vec::new(), has_beam: false }
@@ -140,6 +149,46 @@ fn finite_beam(dice: &mut Dice) -> Case {
         likely.extend((0..8).map(|k| [corner[0], corner[1], THETA_MAX, f64::from(k) * PI / 4.0]));
     }
     Case { likely, has_beam: true, ..case("finite-beam", scene) }
+}
+
+/// Over a panel that a lamp lights nearly evenly, or that lies in the penumbra of an edge.
+fn beam_over_a_panel(dice: &mut Dice) -> Case {
+    let height = 1000.0 * dice.decades(0.0, 2.0);
+    let radius = height * dice.uniform(0.02, 0.05);
+    let mut scene = format!(
+        "{PANEL}[[lamp]]\nkind = \"sphere\"\ncentre_mm = [{}, 0, {height}]\nradius_mm = {radius}\n\
+         radiance_w_per_m2_sr = 1000\n",
+        dice.uniform(-50.0, 50.0)
+    );
+    if dice.uniform(0.0, 1.0) < 0.5 {
+        let edge = dice.uniform(-4.0, 4.0);
+        let _ =
+            write!(scene, "[[occluder]]\nkind = \"half-plane\"\nx_max_mm = {edge}\nz_mm = 450\n");
+    }
+    let mut likely = Vec::new();
+    for corner in [[-HALF_MM, -HALF_MM], [HALF_MM, HALF_MM], [-HALF_MM, HALF_MM], [HALF_MM, 0.0]] {
+        likely.extend((0..8).map(|k| [corner[0], corner[1], THETA_MAX, f64::from(k) * PI / 4.0]));
+    }
+    Case { likely, has_beam: true, ..case("finite-beam", scene) }
+}
+
+/// Nearly as bright as what is behind it.
+fn beam_past_a_ball(dice: &mut Dice) -> Case {
+    let radiance = 10.0 * (1.0 + dice.decades(-8.0, 0.5));
+    let (x, y, z) = (dice.uniform(-40.0, 40.0), dice.uniform(-40.0, 40.0), 120.0);
+    let radius = dice.uniform(2.0, 20.0);
+    let scene = format!(
+        "[[emitter]]\nkind = \"lambertian\"\nx_mm = [-90, 90]\ny_mm = [-90, 90]\n\
+         radiance_w_per_m2_sr = 10\n\
+         [[emitter]]\nkind = \"lambertian\"\ncentre_mm = [{x}, {y}, {z}]\nradius_mm = {radius}\n\
+         radiance_w_per_m2_sr = {radiance}\n"
+    );
+    let limb = |k: u32| {
+        let turn = f64::from(k) * PI / 8.0;
+        let (x, y) = (x + radius * turn.cos(), y + radius * turn.sin());
+        [0.0, 0.0, (x.hypot(y) / z).atan(), y.atan2(x)]
+    };
+    Case { likely: (0..16).map(limb).collect(), has_beam: true, ..case("finite-beam", scene) }
 }
 
 fn read(text: &str) -> Scene {
