@@ -51,7 +51,7 @@ pub use peak::Peak;
 pub use penalty::{Penalised, Penalty};
 pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
-pub use solve::{fit, fit_seen};
+pub use solve::{fit, fit_flown, fit_seen};
 pub use undetermined::Cause;
 
 mod basis;

@@ -13,7 +13,7 @@ use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{Common, FitError, Noise, Region, Sample, Shift, undetermined};
+use crate::{Common, FitError, Noise, Ray, Region, Sample, Shift, undetermined};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -65,6 +65,21 @@ pub fn fit_seen(
     common: &[Common],
     optics: Option<&Optics>,
 ) -> Result<Fit, FitError> {
+    fit_flown(samples, &[], region, model, common, optics)
+}
+
+/// As [`fit_seen`], of readings some of which were taken in flight: `flown` holds, sample by sample,
+/// the rays at the reading's beginning and end, and `None` for one at rest; samples beyond its end
+/// are at rest. The sample's own ray is that of the middle. What a reading in flight says is the
+/// field's mean over its way, but for beams that the sample's outline cuts: those count as at rest.
+pub fn fit_flown(
+    samples: &[Sample],
+    flown: &[Option<(Ray, Ray)>],
+    region: &Region,
+    model: impl Into<Penalised>,
+    common: &[Common],
+    optics: Option<&Optics>,
+) -> Result<Fit, FitError> {
     let model = model.into();
     check(samples, region, model, common)?;
     let basis = Basis::new(model.basis, *region)?;
@@ -74,7 +89,7 @@ pub fn fit_seen(
     {
         return Err(refusal);
     }
-    let design = Design::new(samples, &basis, optics)?;
+    let design = Design::new(samples, &basis, optics)?.in_flight(flown);
     let settled = settle(&design, &prior)?;
     let needs_a_side = |common: &Common| needs_a_side(common, &design);
     let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c)).collect();

@@ -19,6 +19,7 @@ fn sample(value: f64, u: f64, pose: Pose) -> Sample {
         time_s: 0.1 + 0.2,
         dwell_s: 0.05,
         pose,
+        way: None,
         positions: AxisPositions([0.0; 4]),
         value,
         u_independent: 0.25,

@@ -11,7 +11,7 @@
 use radiometry::quadrature::Sum;
 
 use super::bound::Bound;
-use super::{Averager, Cover, Means, Optics};
+use super::{Averager, Cover, Means, Optics, way};
 use crate::basis::{Basis, Scratch, dot};
 use crate::weights::Model;
 use crate::{FitError, Ray, Sample};
@@ -64,6 +64,8 @@ pub(crate) struct Design<'s> {
     samples: &'s [Sample],
     basis: &'s Basis,
     beam: Option<Averaged>,
+    /// Of readings taken in flight: the rays at their beginning and end.
+    flown: &'s [Option<(Ray, Ray)>],
 }
 
 #[derive(Debug)]
@@ -85,6 +87,7 @@ pub(crate) struct Room {
     pub(crate) scratch: Scratch,
     means: Means,
     row: Vec<f64>,
+    flight: Vec<f64>,
 }
 
 impl<'s> Design<'s> {
@@ -105,7 +108,12 @@ impl<'s> Design<'s> {
         readings: usize,
     ) -> Result<Self, FitError> {
         let averaged = |optics| Averaged::new(samples, basis, optics, readings);
-        Ok(Self { samples, basis, beam: optics.map(averaged).transpose()? })
+        Ok(Self { samples, basis, beam: optics.map(averaged).transpose()?, flown: &[] })
+    }
+
+    /// With the ways of readings that were taken in flight, sample by sample.
+    pub(crate) fn in_flight(self, flown: &'s [Option<(Ray, Ray)>]) -> Self {
+        Self { flown, ..self }
     }
 
     pub(crate) fn samples(&self) -> &'s [Sample] {
@@ -130,7 +138,8 @@ impl<'s> Design<'s> {
 
     pub(crate) fn room(&self) -> Room {
         let basis = self.basis;
-        Room { scratch: basis.scratch(), means: Means::new(basis), row: vec![0.0; basis.len()] }
+        let row = || vec![0.0; basis.len()];
+        Room { scratch: basis.scratch(), means: Means::new(basis), row: row(), flight: row() }
     }
 
     /// The row of a sample.
@@ -146,12 +155,33 @@ impl<'s> Design<'s> {
             }
             _ => self.basis.row(&self.samples[i].ray, &mut room.scratch, out),
         }
+        self.add_flight(i, room, out);
+    }
+
+    /// The way of a sample, where the beam sees what the basis says along its axis: not where the
+    /// outline cuts it.
+    fn way(&self, i: usize) -> Option<&(Ray, Ray)> {
+        let kind = self.beam.as_ref().map_or(Kind::Point, |beam| beam.kinds[i]);
+        let is_whole = matches!(kind, Kind::Point | Kind::Smooth(_));
+        self.flown.get(i).and_then(Option::as_ref).filter(|_| is_whole)
+    }
+
+    /// What a window's way adds to the row of its middle: the mean over it by Gauss's two points,
+    /// less the middle, each along the axis. Exact for cubics along the way; that the beam is wide
+    /// changes it in the fourth order only.
+    fn add_flight(&self, i: usize, room: &mut Room, out: &mut [f64]) {
+        let Some(way) = self.way(i) else { return };
+        for (part, weight) in FLIGHT {
+            let ray = way::along(way, part);
+            self.basis.row(&ray, &mut room.scratch, &mut room.flight);
+            out.iter_mut().zip(&room.flight).for_each(|(out, row)| *out += weight * row);
+        }
     }
 
     /// What the fit says that a sample's reading is.
     pub(crate) fn level(&self, i: usize, coefficients: &[f64], room: &mut Room) -> f64 {
         let is_point = self.beam.as_ref().is_none_or(|beam| beam.kinds[i] == Kind::Point);
-        if is_point {
+        if is_point && self.way(i).is_none() {
             return self.basis.value(coefficients, &self.samples[i].ray, &mut room.scratch);
         }
         let mut row = std::mem::take(&mut room.row);
@@ -370,6 +400,9 @@ impl<'b> Choice<'b> {
     }
 }
 
+/// Gauss's two points on a way, each half, and the middle taken off.
+const FLIGHT: [(f64, f64); 3] =
+    [(0.211_324_865_405_187_13, 0.5), (0.788_675_134_594_812_9, 0.5), (0.5, -1.0)];
 /// The shift of a derived quantity by quadrature, in its own independent u, that is aimed at.
 const PART_OF_U: f64 = 0.1;
 /// What the next rule for cut beams errs by, over its difference from the one before.

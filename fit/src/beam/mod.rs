@@ -13,6 +13,7 @@ mod directions;
 mod lens;
 mod outline;
 mod sight;
+mod way;
 
 use glam::DVec3;
 use radiometry::beam::{Beam, footprint};

@@ -22,8 +22,9 @@ impl Calibrated {
         basis: BasisSpec,
         optics: Option<&Optics>,
     ) -> Result<Fitted, FitError> {
-        let FitInput { samples, common, .. } = self.fit_input();
-        let fit = fit::fit_seen(&samples, region, basis, &common, optics)?;
+        let FitInput { samples, common, places } = self.fit_input();
+        let flown: Vec<_> = places.iter().map(|place| self.samples[*place].flown()).collect();
+        let fit = fit::fit_flown(&samples, &flown, region, basis, &common, optics)?;
         Ok(Fitted { fit, n_excluded: self.samples.len() - samples.len() })
     }
 

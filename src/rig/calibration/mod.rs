@@ -124,6 +124,27 @@ impl Rig {
     /// positions latched at its start and at its end, directions averaged as vectors. An axis
     /// without a readback stood where it was sent.
     pub fn measured(&self, reading: &Reading) -> (AxisPositions, Pose) {
+        let (start, end) = self.ends(reading);
+        if start == end {
+            // Exactly, and with the azimuth that the turntable has, at the zenith too.
+            let positions = self.positions(start);
+            return (positions, forward(positions));
+        }
+        (self.mean_positions(start, end), self.mean_pose(start, end))
+    }
+
+    /// The rays at the beginning and the end of a reading that was taken in flight.
+    pub fn way(&self, reading: &Reading) -> Option<(Pose, Pose)> {
+        if reading.travel == Latched::ZERO {
+            return None;
+        }
+        let (start, end) = self.ends(reading);
+        Some((forward(self.positions(start)), forward(self.positions(end))))
+    }
+
+    /// Where the axes stood at the beginning and at the end. One without a readback stood where it
+    /// was sent.
+    fn ends(&self, reading: &Reading) -> (Latched, Latched) {
         let (mut start, mut end) = (reading.start, reading.end);
         for (i, axis) in self.axes.iter().enumerate() {
             if axis.readback == Readback::None {
@@ -131,12 +152,7 @@ impl Rig {
                 end.0[i] = reading.commanded.0[i].saturating_add(reading.travel.0[i]);
             }
         }
-        if start == end {
-            // Exactly, and with the azimuth that the turntable has, at the zenith too.
-            let positions = self.positions(start);
-            return (positions, forward(positions));
-        }
-        (self.mean_positions(start, end), self.mean_pose(start, end))
+        (start, end)
     }
 
     fn mean_positions(&self, start: Latched, end: Latched) -> AxisPositions {

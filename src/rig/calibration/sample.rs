@@ -30,6 +30,8 @@ pub struct Sample {
     pub dwell_s: f64,
     /// The measured ray.
     pub pose: Pose,
+    /// Of a reading taken in flight: where the beam was when it began, and when it ended.
+    pub way: Option<(Pose, Pose)>,
     /// The measured axis positions that it comes from.
     pub positions: AxisPositions,
     /// The radiance, dark level subtracted; negative values stay.
@@ -151,8 +153,12 @@ impl fmt::Display for Flags {
 impl Sample {
     /// The measured ray as the fit takes it.
     pub fn ray(&self) -> fit::Ray {
-        let Pose { x_m, y_m, theta_rad, phi_rad } = self.pose;
-        fit::Ray { x_m, y_m, theta_rad, phi_rad }
+        ray(self.pose)
+    }
+
+    /// The way of a reading taken in flight as the fit takes it.
+    pub fn flown(&self) -> Option<(fit::Ray, fit::Ray)> {
+        self.way.map(|(from, to)| (ray(from), ray(to)))
     }
 
     /// States the uncertainty as it is at `level`: the fitted one where it is known.
@@ -184,6 +190,7 @@ pub(super) fn from_reading(rig: &Rig, darks: &[Dark], reading: &Reading) -> Opti
         time_s: reading.time_s,
         dwell_s: (reading.end_us - reading.start_us) as f64 / 1e6,
         pose,
+        way: rig.way(reading),
         positions,
         value,
         u_independent: 0.0,
@@ -202,6 +209,11 @@ pub(super) fn from_reading(rig: &Rig, darks: &[Dark], reading: &Reading) -> Opti
     };
     sample.state_at(value);
     Some(sample)
+}
+
+fn ray(pose: Pose) -> fit::Ray {
+    let Pose { x_m, y_m, theta_rad, phi_rad } = pose;
+    fit::Ray { x_m, y_m, theta_rad, phi_rad }
 }
 
 fn moved(rig: &Rig, reading: &Reading) -> bool {
