@@ -212,3 +212,39 @@ fn an_interrupted_run_is_carried_on_to_the_same_values() {
     let meta = bench.json("out/samples.meta.json");
     assert_eq!(meta["targets"], "132 of 132 targets measured");
 }
+
+/// Microseconds of the device from the first integration's begin to the last one's end.
+fn span_us(readings: &str) -> f64 {
+    let header: Vec<&str> = readings.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let (start, end) = (column("start_us"), column("end_us"));
+    let at = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
+    let rows = rows(readings);
+    let first = rows.iter().map(|row| at(row, start)).fold(f64::INFINITY, f64::min);
+    rows.iter().map(|row| at(row, end)).fold(0.0, f64::max) - first
+}
+
+#[test]
+fn a_plan_of_sweeps_is_flown_in_the_time_that_was_predicted() {
+    let bench = Bench::of("led-lobe");
+    let plan = bench.gonio(&["plan", "sweep.toml", "--json"]).well().json();
+    assert_eq!(number(&plan, "/sweeps/count").to_bits(), 12.0_f64.to_bits());
+    let said = bench.gonio(&["run", "sweep.toml", "--out", "out"]).well();
+    assert!(said.out.contains("720 of 720 measured"), "{said}");
+    check_samples(&bench);
+    let predicted_s = number(&plan, "/time_s/total") - number(&plan, "/time_s/homing");
+    let took_s = span_us(&bench.text("out/readings.csv")) * 1e-6;
+    assert!((took_s / predicted_s - 1.0).abs() < 1e-3, "{took_s} s, predicted {predicted_s} s");
+    let fit = bench.json("out/fit.json");
+    let exitance = |path: &str| number(&fit, &format!("{path}/exitance_w_per_m2/value"));
+    assert!((exitance("") / exitance("/truth") - 1.0).abs() < 0.03);
+    bench.gonio(&["run", "sweep.toml", "--out", "again"]).well();
+    assert!(bench.text("again/samples.csv") == bench.text("out/samples.csv"));
+
+    let fast = "speed_deg_per_s = 61";
+    let bench = bench.with("sweep.toml", "narrowest_deg = 40", fast);
+    let said = bench.gonio(&["plan", "sweep.toml"]);
+    assert_eq!(said.code, Some(2), "{said}");
+    let _ = said.says(&["speed_deg_per_s", "at most 60.000°/s"]);
+    assert!(!bench.names().iter().any(|name| name.starts_with("runs")), "nothing was begun");
+}
