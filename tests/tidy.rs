@@ -47,7 +47,7 @@ const PURE: [&str; 9] = [
 const KNOWN_IN: [(&str, &[&str]); 9] = [
     ("rusqlite", &["src/journal/"]),
     ("hyper", &["src/daemon/http/", "src/cli/client.rs"]),
-    ("clap", &["src/cli/args.rs", "src/cli/mod.rs"]),
+    ("clap", &["src/cli/args/", "src/cli/mod.rs"]),
     ("tokio_serial", &["src/device/"]),
     ("serialport", &["src/device/"]),
     ("indicatif", &["src/cli/"]),

@@ -14,7 +14,7 @@ pub(crate) fn check(
         return Err(FitError::Region);
     }
     let coefficients = model.basis.checked_len()?;
-    model.penalty.check()?;
+    model.check()?;
     if samples.is_empty() {
         return Err(FitError::Empty);
     }

@@ -31,6 +31,11 @@ pub enum FitError {
         /// As handed in.
         penalty: Penalty,
     },
+    /// A truncation that is negative or not finite.
+    Truncation {
+        /// As handed in.
+        truncation: f64,
+    },
     /// A number of a sample is NaN or infinite. Leave the sample out, or mend its source.
     NotFinite {
         /// The sample.
@@ -126,6 +131,9 @@ impl fmt::Display for FitError {
             }
             Self::Basis { kind } => {
                 write!(f, "basis `{kind}`: its degree or spans are beyond what it is good for")
+            }
+            Self::Truncation { truncation } => {
+                write!(f, "truncation {truncation}: expected a finite number of 0 or more")
             }
             Self::Penalty { penalty: Penalty { power, strength } } => write!(
                 f,

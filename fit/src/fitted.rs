@@ -5,7 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
-use crate::{BasisSpec, BeamRows, FitError, Penalty, Ray, Region};
+use crate::{BasisSpec, BeamRows, FitError, Penalised, Penalty, Ray, Region};
 use radiometry::DomainError;
 use std::f64::consts::FRAC_PI_2;
 
@@ -34,10 +34,8 @@ pub struct Contribution {
 pub struct Parts {
     /// What the fit stands for.
     pub region: Region,
-    /// Which functions.
-    pub basis: BasisSpec,
-    /// What was held against them.
-    pub penalty: Penalty,
+    /// Which functions, and what was held against them.
+    pub model: Penalised,
     /// One a function, in the value's unit.
     pub coefficients: Vec<f64>,
     /// The upper triangular S of the independent covariance S Sᵀ (with a penalty the posterior's, see
@@ -98,9 +96,9 @@ impl Fit {
         if !parts.region.is_sound() {
             return Err(FitError::Region);
         }
-        parts.basis.checked_len()?;
-        parts.penalty.check()?;
-        let basis = Basis::new(parts.basis, parts.region)?;
+        parts.model.basis.checked_len()?;
+        parts.model.check()?;
+        let basis = Basis::new(parts.model.basis, parts.region)?;
         let p = basis.len();
         demand("coefficients", p, &parts.coefficients)?;
         demand("factor", p * (p + 1) / 2, &parts.factor)?;
@@ -116,9 +114,16 @@ impl Fit {
     }
 
     /// The radiance along a ray, in the unit of the samples' values. Outside the region and its
-    /// cone it is extrapolated, and u says how little is known there.
+    /// cone it is extrapolated, and u says how little is known there. What the basis is known not to
+    /// follow ([`Penalised::truncation`]) is in u.
     pub fn radiance(&self, ray: &Ray) -> Estimate {
-        self.estimate(&self.radiance_functional(ray))
+        let of_basis = self.estimate(&self.radiance_functional(ray));
+        let truncation = self.parts.model.truncation;
+        Estimate {
+            u: libm::hypot(of_basis.u, truncation),
+            u_independent: libm::hypot(of_basis.u_independent, truncation),
+            ..of_basis
+        }
     }
 
     /// The radiance along a ray without its uncertainty: for maps and comparisons of many rays.
@@ -177,7 +182,12 @@ impl Fit {
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.
     pub fn radiance_contributions(&self, ray: &Ray) -> Vec<Contribution> {
-        self.budget(&self.radiance_functional(ray))
+        let mut budget = self.budget(&self.radiance_functional(ray));
+        let u = self.parts.model.truncation;
+        if u > 0.0 {
+            budget.push(Contribution { name: TRUNCATION.to_owned(), u });
+        }
+        budget
     }
 
     /// One a function, in the order of [`names`](Self::names).
@@ -207,12 +217,17 @@ impl Fit {
 
     /// Which functions.
     pub fn basis(&self) -> BasisSpec {
-        self.parts.basis
+        self.parts.model.basis
     }
 
     /// What was held against rough fields.
     pub fn penalty(&self) -> Penalty {
-        self.parts.penalty
+        self.parts.model.penalty
+    }
+
+    /// Which functions and what was held against them: to fit other samples alike.
+    pub fn model(&self) -> Penalised {
+        self.parts.model
     }
 
     /// See [`Quality::determined`].
@@ -323,5 +338,7 @@ fn demand(what: &'static str, expected: usize, numbers: &[f64]) -> Result<(), Fi
     }
 }
 
+/// The budget's name for what the basis can't follow.
+const TRUNCATION: &str = "truncation";
 /// The budget's name for what is independent from reading to reading.
 const INDEPENDENT: &str = "independent";

@@ -1,11 +1,12 @@
 //! Samples of radiance along rays to the field L(x, y, θ, φ) that they are samples of, with its
 //! uncertainty. Knows no rig, no counts, no file and no clock.
 //!
-//! The field is a sum of Zernike polynomials on the Nusselt disk (r = sin θ) times Legendre
-//! polynomials in the position over the region. Zernike polynomials are orthonormal under the
-//! projected solid angle cos θ dω, so that the radiant exitance is one coefficient: M = c₀ √π.
+//! The field is a sum of functions of the direction ([`Angular`]: Zernike polynomials on the Nusselt
+//! disk, harmonics, splines) times functions of the position over the region ([`Position`]).
 //! The coefficients come from weighted least squares by a streamed orthogonal factorisation
-//! ([`triangle`]): memory grows with the coefficients, never with the readings.
+//! ([`triangle`]): memory grows with the coefficients, never with the readings. Roughness may be held
+//! against the field ([`Penalty`]); [`choose`] finds basis and penalty from the samples by leaving
+//! out whole sweeps.
 //!
 //! What is independent from reading to reading ([`Noise`]) makes the weights. What all readings
 //! share ([`Common`]: a responsivity, a dark level, an axis zero) makes none; it is carried through
@@ -13,7 +14,7 @@
 //!
 //! A reading stands for the mean of the field over the detector's beam, zero off the sample
 //! ([`fit_seen`]), or where no beam is known for the radiance along one ray ([`fit`](fn@fit)). In
-//! directions that were not measured the polynomials extrapolate, and u grows as it must.
+//! directions that were not measured the functions extrapolate, and u grows as it must.
 //!
 //! ```
 //! use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
@@ -44,11 +45,13 @@
 pub use basis::{Angular, BasisSpec, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
+pub use choice::{AngularKind, Candidate, Choice, SweepKind, Wish, choose};
 pub use error::FitError;
 pub use fitted::{CommonShift, Contribution, Estimate, Fit, Parts, Quality};
 pub use functional::Functional;
 pub use peak::Peak;
 pub use penalty::{Penalised, Penalty};
+pub use resolves::{Limit, Resolves, Width};
 pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
 pub use solve::{fit, fit_flown, fit_seen};
@@ -57,6 +60,7 @@ pub use undetermined::Cause;
 mod basis;
 mod beam;
 mod check;
+mod choice;
 pub mod derive;
 mod error;
 mod fitted;
@@ -66,6 +70,7 @@ pub mod partial;
 mod peak;
 mod penalty;
 pub mod regression;
+mod resolves;
 mod sample;
 mod shift;
 mod solve;

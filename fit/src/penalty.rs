@@ -50,67 +50,71 @@ pub struct Penalised {
     pub basis: BasisSpec,
     /// What is held against them.
     pub penalty: Penalty,
+    /// Standard deviation of the real field about the nearest field of the basis along any ray, in
+    /// the value's unit, as far as it is known ([`choose`](crate::choose) estimates it): part of
+    /// the u of every radiance. Over an integral it averages out, and is left out. 0: not known.
+    pub truncation: f64,
+}
+
+impl Penalised {
+    /// Of a field that the basis can follow.
+    pub const fn new(basis: BasisSpec, penalty: Penalty) -> Self {
+        Self { basis, penalty, truncation: 0.0 }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), FitError> {
+        self.penalty.check()?;
+        let is_sound = self.truncation.is_finite() && self.truncation >= 0.0;
+        if is_sound { Ok(()) } else { Err(FitError::Truncation { truncation: self.truncation }) }
+    }
 }
 
 impl From<BasisSpec> for Penalised {
     fn from(basis: BasisSpec) -> Self {
-        Self { basis, penalty: Penalty::NONE }
+        Self::new(basis, Penalty::NONE)
     }
 }
 
 /// A penalty at its strength over a basis; nothing where it has none.
 #[derive(Debug, Clone)]
 pub(crate) struct Prior {
-    roughness: Option<Roughness>,
-    /// √λ.
-    factor: f64,
+    /// The rows that stand for it.
+    rows: Option<Mat<f64>>,
 }
 
 impl Prior {
     pub(crate) fn new(basis: &Basis, penalty: Penalty) -> Result<Self, FitError> {
-        let is_some = !penalty.is_none() && basis.len() > 1;
-        let roughness = is_some.then(|| Roughness::new(basis, penalty.power)).transpose()?;
-        Ok(Self { roughness, factor: penalty.strength.sqrt() })
+        if penalty.is_none() || basis.len() == 1 {
+            return Ok(Self { rows: None });
+        }
+        let rows = Roughness::new(basis, penalty.power)?.rows(penalty.strength.sqrt());
+        Ok(Self { rows: Some(rows) })
     }
 
     pub(crate) fn is_none(&self) -> bool {
-        self.roughness.is_none()
+        self.rows.is_none()
     }
 
     /// Takes the penalty's rows in, with zeros for the right-hand sides.
     pub(crate) fn absorb_into(&self, triangle: &mut Triangle, sides: usize) {
-        if let Some(roughness) = &self.roughness {
-            let mut wide = Vec::new();
-            roughness.rows(self.factor, |row| {
-                wide.clear();
-                wide.extend_from_slice(row);
-                wide.resize(row.len() + sides, 0.0);
-                triangle.absorb(&wide);
-            });
+        let Some(rows) = &self.rows else { return };
+        let p = rows.ncols();
+        let mut wide = vec![0.0; p + sides];
+        for i in 0..rows.nrows() {
+            for (j, value) in wide[..p].iter_mut().enumerate() {
+                *value = rows[(i, j)];
+            }
+            triangle.absorb(&wide);
         }
     }
 
     /// How many coefficients the samples determine rather than the penalty: all of them less
-    /// λ tr(P C), from the packed S of the covariance C = S Sᵀ.
-    pub(crate) fn determined(&self, factor: &[f64], coefficients: usize) -> f64 {
-        let Some(roughness) = &self.roughness else { return coefficients as f64 };
-        let mut held = 0.0;
-        roughness.rows(self.factor, |row| {
-            let first = row.iter().position(|value| *value != 0.0).unwrap_or(0);
-            held += (first..coefficients)
-                .map(|j| dot(&factor[j * (j + 1) / 2 + first..][..=j - first], &row[first..=j]))
-                .map(|product| product * product)
-                .sum::<f64>();
-        });
-        (coefficients as f64 - held).max(0.0)
-    }
-
-    /// The same of a solution.
+    /// λ tr(P C), C = S Sᵀ being the covariance.
     pub(crate) fn determined_by(&self, solution: &Solution) -> f64 {
-        if self.is_none() {
-            return solution.len() as f64;
-        }
-        self.determined(&solution.inverse(), solution.len())
+        let all = solution.len() as f64;
+        let Some(rows) = &self.rows else { return all };
+        let held = rows * solution.inverse_matrix();
+        (all - held.squared_norm_l2()).max(0.0)
     }
 }
 
@@ -148,36 +152,29 @@ impl Roughness {
         Ok(Self { root, free })
     }
 
-    /// The rows that stand for the penalty, to be taken in like readings of value 0; each is handed
-    /// over times `factor`.
-    pub(crate) fn rows(&self, factor: f64, mut take: impl FnMut(&[f64])) {
+    /// The rows that stand for the penalty, to be taken in like readings of value 0, times `factor`.
+    fn rows(&self, factor: f64) -> Mat<f64> {
         let p = self.free.len();
-        let mut row = vec![0.0; p];
-        if let Root::Diagonal(diagonal) = &self.root {
-            for (k, weight) in diagonal.iter().enumerate() {
-                // The constant is one of the functions.
-                if self.free[k] == 0.0 {
-                    row[k] = factor * weight;
-                    take(&row);
-                    row[k] = 0.0;
+        match &self.root {
+            // The constant is one of the functions.
+            Root::Diagonal(diagonal) => Mat::from_fn(p, p, |i, j| {
+                if i == j && self.free[i] == 0.0 { factor * diagonal[i] } else { 0.0 }
+            }),
+            Root::Upper(root) => {
+                // (1 - w wᵀ) L.
+                let free = Mat::from_fn(p, 1, |i, _| self.free[i]);
+                let across = free.transpose() * root;
+                let mut rows = root - &free * &across;
+                for column in 0..p {
+                    rows.col_as_slice_mut(column).iter_mut().for_each(|value| *value *= factor);
                 }
+                rows
             }
-            return;
-        }
-        // wᵀL, then (1 - w wᵀ) L row by row.
-        let across: Vec<f64> =
-            (0..p).map(|j| (0..=j).map(|i| self.free[i] * self.root.at(i, j)).sum()).collect();
-        for i in 0..p {
-            for (j, out) in row.iter_mut().enumerate() {
-                *out = factor * (self.root.at(i, j) - self.free[i] * across[j]);
-            }
-            take(&row);
         }
     }
 
     /// R in coordinates in which the penalty is that of the identity on all but the first, which is
     /// free: R L⁻¹ H, H being the reflection that takes w to the first axis.
-    #[allow(dead_code, reason = "for choosing the strength from the data, which comes next")]
     pub(crate) fn standard(&self, r: MatRef<'_, f64>) -> Mat<f64> {
         let p = self.free.len();
         let mut out = match &self.root {

@@ -99,20 +99,10 @@ pub fn fit_flown(
     let shifts = shifts(common, &coefficients, &design, &solution);
     let levels = levels(&design, &coefficients);
     let factor = solution.inverse();
-    let determined = prior.determined(&factor, basis.len());
+    let determined = prior.determined_by(&solution);
     let quality = quality(&design, &levels, (&solution, determined), &settled)?;
-    let penalty = model.penalty;
-    let basis = basis.spec();
-    Fit::from_parts(Parts {
-        region: *region,
-        basis,
-        penalty,
-        coefficients,
-        factor,
-        shifts,
-        quality,
-    })
-    .map_err(|_| FitError::OutOfRange)
+    Fit::from_parts(Parts { region: *region, model, coefficients, factor, shifts, quality })
+        .map_err(|_| FitError::OutOfRange)
 }
 
 /// The triangle of samples weighted by what their own fit says, every common component a side of its

@@ -40,7 +40,7 @@ fn drawn(basis: BasisSpec, seed: u64) -> Fit {
     // Any fit has the parts of this basis; only the coefficients are ours.
     let rays = spread_rays(40, &HEMISPHERE, 1);
     let penalty = Penalty { power: 1.0, strength: 1.0 };
-    let some = fit::fit(&exact(&rays, |_| 1.0), &HEMISPHERE, Penalised { basis, penalty }, &[]);
+    let some = fit::fit(&exact(&rays, |_| 1.0), &HEMISPHERE, Penalised::new(basis, penalty), &[]);
     let mut parts = some.unwrap().parts().clone();
     for coefficient in &mut parts.coefficients {
         *coefficient = die.normal();
@@ -54,7 +54,7 @@ fn constants_are_held_and_cost_nothing() {
     let penalty = Penalty { power: 2.0, strength: 1e6 };
     for basis in specs() {
         let fit =
-            fit::fit(&exact(&rays, |_| 7.5), &REGION, Penalised { basis, penalty }, &[]).unwrap();
+            fit::fit(&exact(&rays, |_| 7.5), &REGION, Penalised::new(basis, penalty), &[]).unwrap();
         for ray in spread_rays(20, &HEMISPHERE, 8) {
             assert!((fit.value(&ray) - 7.5).abs() < 1e-8, "{basis:?}: {}", fit.value(&ray));
         }
@@ -173,7 +173,7 @@ fn a_penalty_fills_gaps_with_uncertainty_and_few_readings_are_enough() {
         let basis = BasisSpec { angular, position: Position::Legendre { degree: 0 } };
         assert!(basis.len() > samples.len());
         let penalty = Penalty { power: 2.0, strength: 0.1 };
-        let fit = fit::fit(&samples, &HEMISPHERE, Penalised { basis, penalty }, &[]).unwrap();
+        let fit = fit::fit(&samples, &HEMISPHERE, Penalised::new(basis, penalty), &[]).unwrap();
         let at = |theta_deg: f64| {
             let ray = Ray { x_m: 0.0, y_m: 0.015, theta_rad: theta_deg.to_radians(), phi_rad: 1.0 };
             let (found, truth) = (fit.radiance(&ray), 1.0 + libm::cos(ray.theta_rad));
@@ -202,7 +202,7 @@ fn a_vanishing_penalty_changes_nothing() {
     }
     let penalty = Penalty { power: 2.0, strength: 1e-12 };
     let plain = fit::fit(&samples, &REGION, basis, &[]).unwrap();
-    let held = fit::fit(&samples, &REGION, Penalised { basis, penalty }, &[]).unwrap();
+    let held = fit::fit(&samples, &REGION, Penalised::new(basis, penalty), &[]).unwrap();
     for (a, b) in plain.coefficients().iter().zip(held.coefficients()) {
         assert!((a - b).abs() < 1e-9);
     }
@@ -217,7 +217,7 @@ fn penalties_that_make_no_sense_are_refused() {
     let refused = |angular: Angular, power: f64, strength: f64| {
         let basis = BasisSpec { angular, position: Position::Legendre { degree: 0 } };
         let penalty = Penalty { power, strength };
-        fit::fit(&samples, &REGION, Penalised { basis, penalty }, &[]).unwrap_err().to_string()
+        fit::fit(&samples, &REGION, Penalised::new(basis, penalty), &[]).unwrap_err().to_string()
     };
     for (power, strength) in [(2.0, -1.0), (2.0, f64::NAN), (-1.0, 1.0), (99.0, 1.0)] {
         let said = refused(ANGULAR[0], power, strength);

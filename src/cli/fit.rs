@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{BasisSpec, Optics, Region};
+use fit::{AngularKind, Optics, Region, Resolves, Wish};
 
 use super::args::FitArgs;
 use super::derive;
@@ -14,16 +14,13 @@ use super::output::{note, say, write_out};
 use super::partial;
 use super::results::{Results, read_run};
 use super::setup::rig_at;
-use super::summary::field_rows;
+use super::summary::{field_rows, model_rows};
 use super::text::{row, table};
 use crate::export::{
     FitFile, InputSamples, RayColumns, read_rays, read_samples, write_at, write_atomically,
 };
-use crate::plan::{FitSpec, Wanted};
+use crate::plan::Wanted;
 
-/// The degrees for a CSV, where the command line does not say.
-pub(super) const ANGULAR_DEGREE: usize = 6;
-pub(super) const POSITION_DEGREE: usize = 0;
 /// A region's cone ends this far beyond the outermost sample of a CSV at most.
 const THETA_MAX_RAD: f64 = core::f64::consts::FRAC_PI_2;
 pub(super) const FIT_HELP: &str =
@@ -57,6 +54,47 @@ fn rays_at(path: &Path) -> Result<Vec<RayColumns>, Failure> {
         .map_err(|error| Failure::with_help(format!("{}: {error}", path.display()), help))
 }
 
+/// What the command line decides, and where it is silent the plan. A basis named here leaves the
+/// plan's degree and penalty, which were meant for another, aside.
+pub(super) fn wished(args: &FitArgs, plan: Wish) -> Result<Wish, Failure> {
+    let kind = args.basis.as_deref().map(kind_named).transpose()?;
+    let base = if kind.is_some() && kind != plan.kind {
+        Wish { position_degree: plan.position_degree, ..Wish::default() }
+    } else {
+        plan
+    };
+    if kind == Some(AngularKind::Splines) && args.angular_degree.is_some() {
+        return Err(Failure::with_help(
+            "--angular-degree: splines have no degree to choose: they are cubic",
+            "leave it out: how many splines there are is chosen from the readings",
+        ));
+    }
+    for (flag, value) in
+        [("--penalty-power", args.penalty_power), ("--penalty-strength", args.penalty_strength)]
+    {
+        if value.is_some_and(|value| !(value >= 0.0 && value.is_finite())) {
+            return Err(Failure::start(format!("{flag}: expected a number of 0 or more")));
+        }
+    }
+    Ok(Wish {
+        kind: kind.or(base.kind),
+        angular_degree: args.angular_degree.or(base.angular_degree),
+        position_degree: args.position_degree.or(base.position_degree),
+        penalty_power: args.penalty_power.or(base.penalty_power),
+        penalty_strength: args.penalty_strength.or(base.penalty_strength),
+    })
+}
+
+fn kind_named(name: &str) -> Result<AngularKind, Failure> {
+    AngularKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+        let known = AngularKind::ALL.map(AngularKind::name).join(", ");
+        Failure::with_help(
+            format!("--basis: `{name}` is not a basis"),
+            format!("expected one of {known}, or none: it is then chosen from the readings"),
+        )
+    })
+}
+
 fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
     if args.u_relative.is_some() {
         return Err(Failure::with_help(
@@ -72,11 +110,8 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
     }
     let (mut setup, _, readings) = read_run(&args.source)?;
     setup.plan.derive.extend_from_slice(wanted);
-    let spec = FitSpec {
-        angular_degree: args.angular_degree.unwrap_or(setup.plan.fit.angular_degree),
-        position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
-    };
-    let results = Results::of(&setup, spec, &readings)?;
+    let wish = wished(args, setup.plan.fit)?;
+    let results = Results::of(&setup, wish, &readings)?;
     let fitted = results
         .fitted
         .as_ref()
@@ -86,6 +121,8 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
     derive::write_tables(beside(&path), &results.derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &fitted.fit,
+        choice: fitted.choice.as_ref(),
+        resolves: Some(fitted.resolves),
         quantity: setup.rig.detector.quantity,
         simulated: setup.rig.is_simulated(),
         n_flagged: results.n_flagged(),
@@ -108,20 +145,22 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
     let region = region_of(&input);
-    let basis = BasisSpec::zernike(
-        args.angular_degree.unwrap_or(ANGULAR_DEGREE),
-        args.position_degree.unwrap_or(POSITION_DEGREE),
-    );
+    let wish = wished(args, Wish::default())?;
     let samples = input.fit_samples(args.u_relative);
     let optics = args.rig.as_deref().map(optics_of).transpose()?;
-    let fit = fit::fit_seen(&samples, &region, basis, &[], optics.as_ref())
-        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), FIT_HELP))?;
+    let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
+    let (model, choice) =
+        fit::choose(&samples, &region, &wish, optics.as_ref()).map_err(refused)?;
+    let fit = fit::fit_seen(&samples, &region, model, &[], optics.as_ref()).map_err(refused)?;
+    let resolves = Resolves::of(&samples, &region, model.basis, optics.as_ref());
     let notes = [note_on_u(&input, args.u_relative)];
     let derived = derive::derive(&fit, input.quantity, wanted);
     let folder = args.output.as_deref().map_or(Path::new(""), beside);
     derive::write_tables(folder, &derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &fit,
+        choice: choice.as_ref(),
+        resolves: Some(resolves),
         quantity: input.quantity,
         simulated: false,
         n_flagged: input.flagged(),
@@ -244,6 +283,7 @@ fn summary(args: &FitArgs, file: &FitFile<'_>, written: Option<&Path>) -> String
         row("coefficients", fit.coefficients().len().to_string()),
         row("condition", format!("{:.1}", fit.condition())),
     ];
+    rows.extend(model_rows(fit, file.choice, file.resolves));
     rows.extend(field_rows(fit, file.quantity));
     rows.extend(derive::rows(file.derived, file.quantity));
     rows.extend(file.notes.iter().map(|note| row("note", note)));

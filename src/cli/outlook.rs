@@ -3,7 +3,7 @@
 
 use fit::{FitError, Noise, Sample};
 
-use super::results::{basis, fit_region};
+use super::results::fit_region;
 use super::setup::Setup;
 use crate::rig::forward;
 
@@ -18,11 +18,11 @@ pub(crate) struct Outlook {
 }
 
 /// Fits a sample of equal radiances along the plan's rays. `None` for a plan so large that asking
-/// would take long.
+/// would take long, and for one that leaves the basis to the readings.
 pub(crate) fn outlook(setup: &Setup) -> Option<Result<Outlook, FitError>> {
-    let spec = basis(setup.plan.fit);
+    let model = setup.plan.fit.decided()?;
     let targets = &setup.sequence.targets;
-    let coefficients = spec.len() as f64;
+    let coefficients = model.basis.len() as f64;
     if targets.len() as f64 * coefficients * coefficients > WORK_MAX {
         return None;
     }
@@ -40,7 +40,7 @@ pub(crate) fn outlook(setup: &Setup) -> Option<Result<Outlook, FitError>> {
             Sample { ray, value: 1.0, noise }
         })
         .collect();
-    let fit = fit::fit(&samples, &fit_region(setup), spec, &[]);
+    let fit = fit::fit(&samples, &fit_region(setup), model, &[]);
     Some(
         fit.map(|fit| Outlook {
             coefficients: fit.coefficients().len(),

@@ -7,20 +7,20 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use fit::partial::{Accumulator, Partial, Weighting};
-use fit::{BasisSpec, Optics, Region};
+use fit::{Optics, Penalised, Region, Wish};
 
 use super::args::FitArgs;
 use super::derive;
 use super::failure::{Failure, Outcome};
-use super::fit::{ANGULAR_DEGREE, CSV_HELP, FIT_HELP, POSITION_DEGREE, beside, optics_of, show};
+use super::fit::{CSV_HELP, FIT_HELP, beside, optics_of, show, wished};
 use super::output::say;
-use super::results::{basis, fit_region, optics, read_run};
+use super::results::{fit_region, optics, read_run};
 use super::text::{row, table};
 use crate::export::{
     BlockError, FitFile, InputSamples, PartialFile, RayColumns, ReadPartial, read_sample_blocks,
     write_atomically,
 };
-use crate::plan::{FitSpec, Wanted};
+use crate::plan::Wanted;
 use crate::rig::Quantity;
 use crate::rig::calibration::calibrate;
 
@@ -61,13 +61,10 @@ fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
     }
     let (setup, _, readings) = read_run(&args.source)?;
     let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
-    let spec = FitSpec {
-        angular_degree: args.angular_degree.unwrap_or(setup.plan.fit.angular_degree),
-        position_degree: args.position_degree.unwrap_or(setup.plan.fit.position_degree),
-    };
+    let model = decided(wished(args, setup.plan.fit)?)?;
     let (region, optics) = (fit_region(&setup), optics(&setup));
     let input = calibrated.fit_input();
-    let partial = Partial::of(&input.samples, &region, basis(spec), &input.common, optics.as_ref())
+    let partial = Partial::of(&input.samples, &region, model, &input.common, optics.as_ref())
         .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
     let flagged = calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count();
     Ok(PartialFile {
@@ -80,10 +77,30 @@ fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
     })
 }
 
+/// The one model that all shares are fitted with: none of them may choose for itself.
+fn decided(wish: Wish) -> Result<Penalised, Failure> {
+    wish.decided().ok_or_else(|| {
+        Failure::with_help(
+            "--partial: the basis is not pinned, and shares can't choose one each for itself",
+            "--angular-degree N --position-degree N (and --basis, --penalty-strength), for \
+             example as `choice` in the fit.json of one share's own fit names them",
+        )
+    })
+}
+
+/// What a share of a CSV is fitted with where the command line is silent.
+const DEGREES: Wish = Wish {
+    kind: None,
+    angular_degree: Some(6),
+    position_degree: Some(0),
+    penalty_power: None,
+    penalty_strength: None,
+};
+
 /// A CSV, read in blocks: memory doesn't grow with its length.
 struct Share<'a> {
     region: Region,
-    basis: BasisSpec,
+    model: Penalised,
     optics: Option<&'a Optics>,
     begun: Option<(Accumulator, Quantity)>,
     n_flagged: u64,
@@ -104,10 +121,7 @@ fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
             y_m: metres(y_mm),
             theta_max_rad: theta_max_deg.to_radians(),
         },
-        basis: BasisSpec::zernike(
-            args.angular_degree.unwrap_or(ANGULAR_DEGREE),
-            args.position_degree.unwrap_or(POSITION_DEGREE),
-        ),
+        model: decided(wished(args, DEGREES)?)?,
         optics: optics.as_ref(),
         begun: None,
         n_flagged: 0,
@@ -136,7 +150,7 @@ impl Share<'_> {
     fn take(&mut self, block: &InputSamples) -> Result<(), String> {
         if self.begun.is_none() {
             let weighting = if block.has_u() { Weighting::Stated } else { Weighting::Alike };
-            let begun = Accumulator::new(self.region, self.basis, self.optics.copied(), weighting);
+            let begun = Accumulator::new(self.region, self.model, self.optics.copied(), weighting);
             self.begun = Some((begun.map_err(|error| error.to_string())?, block.quantity));
         }
         let Some((accumulator, _)) = &mut self.begun else { return Ok(()) };
@@ -188,6 +202,8 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wan
     derive::write_tables(folder, &derived).map_err(Failure::midway)?;
     let file = FitFile {
         fit: &closed.fit,
+        choice: None,
+        resolves: None,
         quantity: first.quantity,
         simulated,
         n_flagged: usize::try_from(n_flagged).unwrap_or(usize::MAX),

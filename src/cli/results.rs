@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{BasisSpec, FitError, Optics, Region};
+use fit::{FitError, Optics, Penalised, Region, Wish};
 
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
@@ -16,7 +16,6 @@ use crate::export::{
     write_accuracy, write_atomically, write_readings, write_samples,
 };
 use crate::journal::{Header, InputRole, Order, Reader};
-use crate::plan::FitSpec;
 use crate::rig::Reading;
 use crate::rig::calibration::{Calibrated, Fitted, calibrate};
 use crate::study::Score;
@@ -46,10 +45,10 @@ pub(crate) struct Results {
 impl Results {
     /// Calibrates and fits a run's readings. An error is one of the readings; a fit that is not
     /// possible is a result too, since the samples stand.
-    pub(crate) fn of(setup: &Setup, spec: FitSpec, readings: &[Reading]) -> Result<Self, Failure> {
+    pub(crate) fn of(setup: &Setup, wish: Wish, readings: &[Reading]) -> Result<Self, Failure> {
         let mut calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
-        let (region, basis, optics) = (fit_region(setup), basis(spec), optics(setup));
-        let fitted = calibrated.fit(&region, basis, optics.as_ref());
+        let (region, optics) = (fit_region(setup), optics(setup));
+        let fitted = calibrated.fit(&region, &wish, optics.as_ref());
         let levels = match &fitted {
             Ok(fitted) => calibrated.restate_from(&fitted.fit, optics.as_ref()),
             Err(_) => Vec::new(),
@@ -59,7 +58,9 @@ impl Results {
         }
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
-        let accuracy = accuracy(&calibrated, &region, basis, optics.as_ref());
+        let model = fitted.as_ref().map_or_else(|_| wish.decided(), |f| Some(f.fit.model()));
+        let accuracy = model
+            .map_or_else(Vec::new, |model| accuracy(&calibrated, &region, model, optics.as_ref()));
         let derived = fitted.as_ref().map_or_else(
             |_| Vec::new(),
             |fitted| derive(&fitted.fit, setup.rig.detector.quantity, &setup.plan.derive),
@@ -139,6 +140,8 @@ impl Results {
     ) -> Result<(), ExportError> {
         let file = FitFile {
             fit: &fitted.fit,
+            choice: fitted.choice.as_ref(),
+            resolves: Some(fitted.resolves),
             quantity: setup.rig.detector.quantity,
             simulated: setup.rig.is_simulated(),
             n_flagged: self.n_flagged(),
@@ -197,11 +200,6 @@ pub(crate) fn optics(setup: &Setup) -> Option<Optics> {
     Some(Optics { beam, outline: setup.plan.sample })
 }
 
-/// The plan's basis as the fit takes it.
-pub(crate) fn basis(spec: FitSpec) -> BasisSpec {
-    BasisSpec::zernike(spec.angular_degree, spec.position_degree)
-}
-
 /// What is true, and how far the fit lies from it.
 fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Option<Score>)> {
     let truth = setup.truth()?;
@@ -225,13 +223,13 @@ fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Op
     Some((stated, score))
 }
 
-/// Fits of the first readings, ever more of them: half as many for two points further back.
+/// Fits of the first readings in the basis that all of them chose, ever more of them: half as many for two points further back.
 /// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
 /// of it is determined by its noise and its truncation alone, and is no point of the curve.
 fn accuracy(
     calibrated: &Calibrated,
     region: &Region,
-    basis: BasisSpec,
+    model: Penalised,
     optics: Option<&Optics>,
 ) -> Vec<AccuracyPoint> {
     let total = calibrated.samples.len();
@@ -249,7 +247,7 @@ fn accuracy(
     let point = |count: usize| {
         let known = calibrated.first(count);
         let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
-        let fit = known.fit(region, basis, optics).ok()?.fit;
+        let fit = known.fit_as(region, model, optics).ok()?.fit;
         (fit.condition() <= ACCURACY_CONDITION_MAX).then(|| AccuracyPoint {
             rig_s: last.fold(0.0, f64::max),
             readings: count as u64,

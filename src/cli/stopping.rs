@@ -3,15 +3,17 @@
 
 use super::acquire::Pace;
 use super::failure::Failure;
-use super::results::{Results, basis, fit_region, optics, targets_planned};
+use super::results::{Results, fit_region, optics, targets_planned};
 use super::setup::Setup;
 use super::text::percent;
-use crate::rig::calibration::{Fitted, calibrate};
+use crate::rig::calibration::{Calibrated, Fitted, calibrate};
 use crate::rig::{Reading, ReadingKind, Rig};
 use crate::run::{Rule, Watch};
 
 /// A fit says something about its own misfit from this many samples a coefficient on.
 const SAMPLES_PER_COEFFICIENT: usize = 2;
+/// Coefficients that a basis chosen from the readings is taken to have, before there are any.
+const COEFFICIENTS_CHOSEN: usize = 30;
 /// The fit is made anew whenever there are this much more targets: all fits together cost about
 /// eleven times the last one.
 const GROWTH: f64 = 1.1;
@@ -37,7 +39,9 @@ pub(crate) fn rule(
 struct Target {
     rig: Rig,
     region: fit::Region,
-    basis: fit::BasisSpec,
+    wish: fit::Wish,
+    /// What the wish leaves open, as it was chosen last, and at how many targets.
+    chosen: Option<(fit::Penalised, usize)>,
     optics: Option<fit::Optics>,
     asked: f64,
     planned: usize,
@@ -48,12 +52,14 @@ struct Target {
 
 impl Target {
     fn new(setup: &Setup, asked: f64, before: Vec<Reading>) -> Self {
-        let basis = basis(setup.plan.fit);
-        let first = basis.len().saturating_mul(SAMPLES_PER_COEFFICIENT);
+        let wish = setup.plan.fit;
+        let coefficients = wish.decided().map_or(COEFFICIENTS_CHOSEN, |model| model.basis.len());
+        let first = coefficients.saturating_mul(SAMPLES_PER_COEFFICIENT);
         Self {
             rig: setup.rig.clone(),
             region: fit_region(setup),
-            basis,
+            wish,
+            chosen: wish.decided().map(|model| (model, usize::MAX)),
             optics: optics(setup),
             asked,
             planned: targets_planned(setup),
@@ -72,12 +78,28 @@ impl Target {
         }
         self.next = grown(self.targets);
         let calibrated = calibrate(&self.rig, &self.readings).ok()?;
-        let fitted = calibrated.fit(&self.region, self.basis, self.optics.as_ref());
-        let u = u_relative(&fitted.ok()?);
+        let u = u_relative(&self.fitted(&calibrated)?);
         (u <= self.asked).then(|| {
             let (asked, targets, planned) = (percent(self.asked), self.targets, self.planned);
             format!("exitance to {asked} after {targets} of {planned} targets")
         })
+    }
+}
+
+impl Target {
+    /// In the basis chosen last; it is chosen anew whenever there are twice as many targets.
+    fn fitted(&mut self, calibrated: &Calibrated) -> Option<Fitted> {
+        let optics = self.optics.as_ref();
+        match self.chosen {
+            Some((model, at)) if self.targets / 2 < at => {
+                calibrated.fit_as(&self.region, model, optics).ok()
+            }
+            _ => {
+                let fitted = calibrated.fit(&self.region, &self.wish, optics).ok()?;
+                self.chosen = Some((fitted.fit.model(), self.targets));
+                Some(fitted)
+            }
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fit::{BeamRows, Fit};
+use fit::{Angular, BasisSpec, BeamRows, Choice, Fit, Penalty, Position, Resolves, Width};
 use serde_json::{Value, json};
 
 use super::derive;
@@ -61,7 +61,8 @@ impl Summary<'_> {
         };
         let fit = &fitted.fit;
         let exitance = fit.exitance();
-        let mut rows = field_rows(fit, self.setup.rig.detector.quantity);
+        let mut rows = model_rows(fit, fitted.choice.as_ref(), Some(fitted.resolves));
+        rows.extend(field_rows(fit, self.setup.rig.detector.quantity));
         if exitance.value > 0.0 {
             let independent = percent(exitance.u_independent / exitance.value);
             let whole = percent(exitance.u / exitance.value);
@@ -169,6 +170,78 @@ fn in_words(beam: BeamRows) -> String {
     let said = kinds.into_iter().filter(|(count, _)| *count > 0);
     let said: Vec<String> = said.map(|(count, how)| format!("{count} {how}")).collect();
     format!("readings {}", said.join(", "))
+}
+
+/// What a fit is made of, what it was chosen from, and what it can show.
+pub(crate) fn model_rows(
+    fit: &Fit,
+    choice: Option<&Choice>,
+    resolves: Option<Resolves>,
+) -> Vec<Vec<String>> {
+    let held = if fit.penalty().is_none() {
+        "no penalty".to_owned()
+    } else {
+        let Penalty { power, strength } = fit.penalty();
+        let determined = fit.determined();
+        format!("penalty of power {power}, strength {strength:.2e}; {determined:.0} determined")
+    };
+    let count = fit.coefficients().len();
+    let basis = format!("{}, {count} coefficients, {held}", basis_in_words(fit.basis()));
+    let mut rows = vec![row("basis", basis)];
+    rows.extend(choice.map(|choice| row("  chosen by", choice_in_words(choice))));
+    rows.extend(resolves.map(|resolves| row("resolves", resolves_in_words(resolves))));
+    rows
+}
+
+fn basis_in_words(basis: BasisSpec) -> String {
+    let angular = match basis.angular {
+        Angular::Zernike { degree, cosine_columns: 0 } => format!("Zernike of degree {degree}"),
+        Angular::Zernike { degree, cosine_columns } => {
+            format!("Zernike of degree {degree} and {cosine_columns} of cos θ")
+        }
+        Angular::Hemispherical { degree } => format!("hemispherical harmonics of degree {degree}"),
+        Angular::EvenHarmonics { degree } => format!("even harmonics of degree {degree}"),
+        Angular::Splines { theta_spans, phi_spans } => {
+            format!("splines of {theta_spans} spans in θ, {phi_spans} round the horizon")
+        }
+    };
+    match basis.position {
+        Position::Legendre { degree: 0 } => angular,
+        Position::Legendre { degree } => format!("{angular}, degree {degree} in x and y"),
+        Position::Splines { spans } => format!("{angular}, splines of {spans} spans in x and y"),
+    }
+}
+
+fn choice_in_words(choice: &Choice) -> String {
+    let Choice { sweeps, n_sweeps, n_readings, candidates } = choice;
+    let tried = candidates.len();
+    let text = format!(
+        "leaving out {} ({n_sweeps} of {n_readings} readings), of {tried} tried",
+        sweeps.name()
+    );
+    let Some(next) = candidates.get(1) else { return text };
+    let basis = basis_in_words(next.model.basis);
+    format!("{text}; next {basis} ({:+.2} a reading)", next.score)
+}
+
+fn resolves_in_words(resolves: Resolves) -> String {
+    let degrees = |width: Width| {
+        if width.width.is_finite() {
+            format!("{:.1}° ({})", width.width.to_degrees(), width.limit.name())
+        } else {
+            "nothing".to_owned()
+        }
+    };
+    let mm = |axis: &str, width: Option<Width>| {
+        let width = width?;
+        Some(format!("{:.1} mm in {axis} ({})", width.width * 1e3, width.limit.name()))
+    };
+    let mut text = vec![format!("{} in θ", degrees(resolves.theta_rad))];
+    text.extend(resolves.phi_rad.map(|width| format!("{} in φ", degrees(width))));
+    text.extend(mm("x", resolves.x_m));
+    text.extend(mm("y", resolves.y_m));
+    let measured = resolves.measured_to_rad.to_degrees();
+    format!("{}; nothing was measured beyond {measured:.1}°", text.join(", "))
 }
 
 /// What a fit says of its field, whoever asks.

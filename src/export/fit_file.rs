@@ -2,7 +2,9 @@
 
 use std::io::{self, Write};
 
-use fit::{Angular, BeamRows, Estimate, Fit, Position};
+use fit::{
+    Angular, BasisSpec, BeamRows, Choice, Estimate, Fit, Limit, Penalty, Position, Resolves, Width,
+};
 use serde_json::{Map, Value, json};
 
 use super::DerivedQuantity;
@@ -13,6 +15,10 @@ use crate::rig::Quantity;
 pub struct FitFile<'a> {
     /// The fit.
     pub fit: &'a Fit,
+    /// What its basis and penalty were chosen from; `None` where they were pinned.
+    pub choice: Option<&'a Choice>,
+    /// The narrowest feature that can be seen; `None` where the readings' rays are not at hand.
+    pub resolves: Option<Resolves>,
     /// What its values are.
     pub quantity: Quantity,
     /// Whether the samples come from a simulated rig.
@@ -80,8 +86,11 @@ impl FitFile<'_> {
         let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
         put("quantity", json!(quantity.name()));
         put("simulated", json!(self.simulated));
-        put("basis", basis(fit));
+        put("basis", basis(fit.basis(), Some(fit.names())));
         put("penalty", json!({"power": fit.penalty().power, "strength": fit.penalty().strength}));
+        put("truncation", json!(fit.model().truncation));
+        put("choice", self.choice.map_or(Value::Null, choice));
+        put("resolves", self.resolves.map_or(Value::Null, resolves));
         put(
             "region",
             json!({
@@ -159,8 +168,7 @@ impl FitFile<'_> {
 }
 
 /// Which functions. What a kind does not have is null.
-fn basis(fit: &Fit) -> Value {
-    let spec = fit.basis();
+fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
     let (cosine_columns, spans) = match spec.angular {
         Angular::Zernike { cosine_columns, .. } => (Some(cosine_columns), None),
         Angular::Hemispherical { .. } | Angular::EvenHarmonics { .. } => (None, None),
@@ -177,7 +185,7 @@ fn basis(fit: &Fit) -> Value {
         Angular::Splines { .. } => "cubic B-splines in theta and phi",
     };
     let position = if position_spans.is_some() { "cubic B-splines" } else { "Legendre" };
-    json!({
+    let mut basis = json!({
         "kind": format!("{angular} times {position} in x and y"),
         "angular": spec.angular.name(),
         "angular_degree": spec.angular.degree(),
@@ -186,7 +194,47 @@ fn basis(fit: &Fit) -> Value {
         "phi_spans": spans.map(|(_, phi)| phi),
         "position_degree": spec.position.degree(),
         "position_spans": position_spans,
-        "functions": fit.names(),
+    });
+    if let Some(functions) = functions {
+        basis["functions"] = json!(functions);
+    }
+    basis
+}
+
+fn penalty(penalty: Penalty) -> Value {
+    json!({"power": penalty.power, "strength": penalty.strength})
+}
+
+/// All that was tried, the chosen one first.
+fn choice(choice: &Choice) -> Value {
+    let candidates = choice.candidates.iter().map(|candidate| {
+        json!({
+            "basis": basis(candidate.model.basis, None),
+            "penalty": penalty(candidate.model.penalty),
+            "coefficients": candidate.coefficients,
+            "score": candidate.score,
+            "left_out_rms_over_u": candidate.left_out_rms,
+        })
+    });
+    json!({
+        "left_out": choice.sweeps.name(),
+        "n_sweeps": choice.n_sweeps,
+        "n_readings": choice.n_readings,
+        "candidates": candidates.collect::<Vec<Value>>(),
+    })
+}
+
+fn resolves(resolves: Resolves) -> Value {
+    let angle = |width: Width| (width.width.to_degrees(), width.limit);
+    let length = |width: Width| (width.width * 1e3, width.limit);
+    // Not finite: the basis is constant along it. JSON says null.
+    let put = |(width, limit): (f64, Limit)| json!({"width": width, "limit": limit.name()});
+    json!({
+        "theta_deg": put(angle(resolves.theta_rad)),
+        "phi_deg": resolves.phi_rad.map(angle).map_or(Value::Null, put),
+        "x_mm": resolves.x_m.map(length).map_or(Value::Null, put),
+        "y_mm": resolves.y_m.map(length).map_or(Value::Null, put),
+        "measured_to_deg": resolves.measured_to_rad.to_degrees(),
     })
 }
 
@@ -227,7 +275,7 @@ fn write_rows(out: &mut impl Write, rows: &[Value]) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
+    use fit::{Common, Noise, Ray, Region, Sample, Shift};
     use std::f64::consts::PI;
 
     fn lambertian() -> Fit {
@@ -267,6 +315,8 @@ mod tests {
         let quantity = Quantity::Radiance;
         let file = FitFile {
             fit: &fit,
+            choice: None,
+            resolves: None,
             quantity,
             simulated: true,
             n_flagged: 3,
@@ -311,6 +361,8 @@ mod tests {
         for quantity in [Quantity::Luminance, Quantity::Relative] {
             let file = FitFile {
                 fit: &fit,
+                choice: None,
+                resolves: None,
                 quantity,
                 simulated: false,
                 n_flagged: 0,

@@ -5,13 +5,12 @@
 
 use std::time::Duration;
 
-use fit::Outline;
+use fit::{AngularKind, Outline, Wish};
 use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
-    Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted,
-    WarmUp,
+    Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted, WarmUp,
 };
 use crate::rig::Pose;
 
@@ -37,6 +36,8 @@ const COUNT_MAX: i64 = TARGETS_MAX as i64;
 const REPEAT_MAX: i64 = 1_000;
 const ANGULAR_DEGREE_MAX: i64 = 60;
 const POSITION_DEGREE_MAX: i64 = 12;
+const PENALTY_POWER: Bounds = Bounds::between(0.0, 8.0);
+const PENALTY_STRENGTH: Bounds = Bounds::between(0.0, 1e30);
 /// Targets between dark readings, and between reference readings, where the plan does not say.
 const DARK_EVERY: u32 = 200;
 const REFERENCE_EVERY: u32 = 100;
@@ -65,7 +66,7 @@ impl Plan {
         let reference = read_reference(root.table("reference")?, &region, dwell)?;
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
-        let fit = read_fit(root.required_table("fit")?)?;
+        let fit = root.table("fit")?.map(read_fit).transpose()?.unwrap_or_default();
         let derive = Wanted::read_all(&root)?;
         root.finish()?;
         Ok(Self {
@@ -363,17 +364,34 @@ fn read_stop(table: Table<'_>) -> Result<Stop, Problem> {
     Ok(stop)
 }
 
-/// `[fit]`: `angular_degree` of the polynomials on the Nusselt disk; `position_degree` of those in
-/// x and y.
-fn read_fit(table: Table<'_>) -> Result<FitSpec, Problem> {
+/// `[fit]`: what of the fit's basis is decided beforehand; what it doesn't name, and all of it where
+/// there is no such table, is chosen from the readings by leaving out whole sweeps.
+///
+/// `basis`: "zernike", "hemispherical", "even-harmonics" or "splines". `angular_degree`: of the
+/// polynomials in direction, Zernike's unless `basis` says otherwise; splines have none.
+/// `position_degree`: total degree of those in x and y. `penalty_power` and `penalty_strength`: how
+/// roughness is held against the field, see docs/fit.md; 0 for not at all, which is also what a
+/// pinned `angular_degree` means without them.
+fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
     let degree = |key: &str, most: i64| {
-        let degree = table.required_integer(key, 0..=most)?;
-        Ok(usize::try_from(degree).unwrap_or_default())
+        let degree = table.integer(key, 0..=most)?;
+        Ok(degree.map(|degree| usize::try_from(degree).unwrap_or_default()))
     };
-    let fit = FitSpec {
+    let fit = Wish {
+        kind: table.choice("basis", &AngularKind::ALL.map(|kind| (kind.name(), kind)))?,
         angular_degree: degree("angular_degree", ANGULAR_DEGREE_MAX)?,
         position_degree: degree("position_degree", POSITION_DEGREE_MAX)?,
+        penalty_power: table.number("penalty_power", PENALTY_POWER)?,
+        penalty_strength: table.number("penalty_strength", PENALTY_STRENGTH)?,
     };
+    if fit.kind == Some(AngularKind::Splines) && fit.angular_degree.is_some() {
+        return Err(table.problem(
+            "angular_degree",
+            "splines have no degree to choose: they are cubic",
+            "no angular_degree beside basis = \"splines\"",
+            "leave it out: how many splines there are is chosen from the readings",
+        ));
+    }
     table.finish()?;
     Ok(fit)
 }

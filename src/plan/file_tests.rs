@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use fit::Outline;
+use fit::{AngularKind, Outline, Wish};
 use spanned_toml::{Document, Problem, Source};
 
 use super::*;
@@ -68,7 +68,8 @@ fn every_key_is_read_in_si_units() {
     assert_eq!(plan.reference.pose.phi_rad.to_bits(), std::f64::consts::PI.to_bits());
     assert_eq!(plan.warm_up.unwrap().timeout, Duration::from_mins(30));
     assert_eq!(plan.stop.rig_time_max, Some(Duration::from_hours(1)));
-    assert_eq!(plan.fit, FitSpec { angular_degree: 8, position_degree: 2 });
+    let degrees = Wish { angular_degree: Some(8), position_degree: Some(2), ..Wish::default() };
+    assert_eq!(plan.fit, degrees);
 }
 
 #[test]
@@ -135,13 +136,26 @@ fn every_mistake_is_named_at_its_line() {
         ("angular_degree = 8", "angular_degree = 8.5", "fit.angular_degree"),
         ("scene = \"scene.toml\"", "scenes = \"scene.toml\"", "scenes"),
         ("name = \"luminaire\"", "name = \"../luminaire\"", "name"),
-        ("[fit]", "[fitting]", "fit"),
+        ("[fit]", "[fitting]", "fitting"),
+        ("angular_degree = 8", "basis = \"zernicke\"", "fit.basis"),
+        ("angular_degree = 8", "angular_degree = 8\nbasis = \"splines\"", "fit.angular_degree"),
+        ("angular_degree = 8", "penalty_power = -1", "fit.penalty_power"),
     ] {
         assert!(FULL.contains(from), "{from}");
         let problem = read(&FULL.replace(from, to)).unwrap_err();
         assert_eq!(problem.key(), key, "{problem}");
-        // What the file as a whole lacks has no line.
-        assert!(problem.line_and_column().is_some() || key == "fit", "{problem}");
+        assert!(problem.line_and_column().is_some(), "{problem}");
         assert!(problem.to_string().contains("expected"), "{problem}");
     }
+}
+
+#[test]
+fn what_the_fit_leaves_open_is_left_to_the_readings() {
+    let open = FULL.split("[fit]").next().unwrap();
+    assert_eq!(read(open).unwrap().fit, Wish::default());
+    assert!(read(open).unwrap().fit.decided().is_none());
+    let pinned = format!("{open}[fit]\nbasis = \"even-harmonics\"\nangular_degree = 6\n");
+    let fit = read(&pinned).unwrap().fit;
+    assert_eq!((fit.kind, fit.angular_degree), (Some(AngularKind::EvenHarmonics), Some(6)));
+    assert_eq!(fit.position_degree, None);
 }

@@ -6,7 +6,7 @@
 use core::fmt;
 
 use firmware_protocol::Shutter;
-use fit::Outline;
+use fit::{Outline, Wish};
 
 use super::{Plan, Sequence, Step};
 use crate::rig::ReadingKind;
@@ -32,8 +32,7 @@ impl Plan {
         for edge in [region.x_m.0, region.x_m.1, region.y_m.0, region.y_m.1, region.theta_max_rad] {
             hash.number(edge);
         }
-        hash.integer(self.fit.angular_degree as u64);
-        hash.integer(self.fit.position_degree as u64);
+        hash.wish(&self.fit);
         if let Some(outline) = &self.sample {
             let numbers = match *outline {
                 Outline::Rectangle { x_m, y_m } => [x_m.0, x_m.1, y_m.0, y_m.1],
@@ -60,6 +59,20 @@ impl Plan {
 struct Fnv(u64);
 
 impl Fnv {
+    /// Degrees alone are hashed as they were when there was nothing else to wish for.
+    fn wish(&mut self, wish: &Wish) {
+        for degree in [wish.angular_degree, wish.position_degree] {
+            self.integer(degree.map_or(u64::MAX, |degree| degree as u64));
+        }
+        let numbers = [wish.penalty_power, wish.penalty_strength];
+        if wish.kind.is_some() || numbers.iter().any(Option::is_some) {
+            self.integer(wish.kind.map_or(u64::MAX, |kind| kind as u64));
+            for number in numbers {
+                self.number(number.unwrap_or(-1.0));
+            }
+        }
+    }
+
     fn step(&mut self, step: &Step) {
         let kind = match step.kind {
             ReadingKind::Dark => 0,

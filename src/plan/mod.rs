@@ -29,9 +29,7 @@ mod wanted;
 pub use cost::{Prediction, StepTime, TimeLeft};
 pub use hash::PlanHash;
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};
-pub use terms::{
-    Dark, DarkMethod, FitSpec, Order, Plan, Reference, Region, Schedule, Stop, WarmUp,
-};
+pub use terms::{Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, WarmUp};
 pub use wanted::{Asked, Wanted};
 
 /// The most targets that a plan may have. At a second each they take twelve days.

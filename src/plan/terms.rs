@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use fit::Outline;
+use fit::{Outline, Wish};
 use spanned_toml::Document;
 
 use super::Wanted;
@@ -42,7 +42,7 @@ pub struct Plan {
     /// `[stop]`.
     pub stop: Stop,
     /// `[fit]`.
-    pub fit: FitSpec,
+    pub fit: Wish,
     /// `[[derive]]`: what shall be derived from the fit.
     pub derive: Vec<Wanted>,
     pub(super) document: Document,
@@ -168,15 +168,6 @@ pub struct Stop {
     pub exitance_relative: Option<f64>,
     /// So that the rig has worked no longer than this.
     pub rig_time_max: Option<Duration>,
-}
-
-/// The basis of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FitSpec {
-    /// Degree of the Zernike polynomials on the Nusselt disk.
-    pub angular_degree: usize,
-    /// Total degree of the polynomials in x and y.
-    pub position_degree: usize,
 }
 
 impl Plan {

@@ -67,7 +67,8 @@ impl Rung {
             list @ Schedule::List { .. } => list,
         };
         if plan.list_file().is_none() {
-            plan.fit.angular_degree = scaled_degree(plan.fit.angular_degree, finer);
+            plan.fit.angular_degree =
+                plan.fit.angular_degree.map(|degree| scaled_degree(degree, finer));
         }
         plan.dwell = whole_micros(plan.dwell.mul_f64(self.dwell));
         // What a rung is compared by is what its rules would have ended it by.

@@ -2,7 +2,7 @@
 
 use super::{Partial, Sums, Weighting};
 use crate::fitted::{CommonShift, Parts, Quality};
-use crate::penalty::Prior;
+use crate::penalty::{Penalised, Prior};
 use crate::solve::left_over;
 use crate::triangle::{Solution, Spectrum};
 use crate::weights::threshold;
@@ -59,7 +59,7 @@ impl Partial {
             }
             let coefficients = solution.unknowns(0);
             let factor = solution.inverse();
-            let determined = prior.determined(&factor, basis.len());
+            let determined = prior.determined_by(&solution);
             let squares = triangle.residual_squares(&coefficients);
             let scatter = scatter(squares, n_used as f64 - determined, stated, &sums)
                 .ok_or(FitError::NoScatter { readings: n_used })?;
@@ -81,8 +81,8 @@ impl Partial {
                 beam: None,
             };
             let shifts = shifts(&solution, common);
-            let (region, basis) = (*basis.region(), basis.spec());
-            let parts = Parts { region, basis, penalty, coefficients, factor, shifts, quality };
+            let (region, model) = (*basis.region(), Penalised::new(basis.spec(), penalty));
+            let parts = Parts { region, model, coefficients, factor, shifts, quality };
             let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
             return Ok(Closed { fit, u_factor: scatter.u_factor });
         }

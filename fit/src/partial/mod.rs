@@ -166,7 +166,7 @@ impl Accumulator {
         optics: Option<Optics>,
         weighting: Weighting,
     ) -> Result<Self, FitError> {
-        let Penalised { basis, penalty } = model.into();
+        let Penalised { basis, penalty, .. } = model.into();
         let basis = basis_over(basis, penalty, region)?;
         let triangle = Triangle::new(basis.len(), 1);
         let (common, sums) = (Vec::new(), Sums::NONE);

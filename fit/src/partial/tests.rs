@@ -132,7 +132,7 @@ fn shares_that_stand_for_something_else_are_refused() {
 #[test]
 fn a_penalised_merge_equals_the_penalised_fit() {
     let penalty = Penalty { power: 2.0, strength: 1e-4 };
-    let model = Penalised { basis: BasisSpec::zernike(8, 1), penalty };
+    let model = Penalised::new(BasisSpec::zernike(8, 1), penalty);
     for (u, weighting) in [(Some(0.45), Weighting::Stated), (None, Weighting::Alike)] {
         let samples = samples(300, |_| u);
         let whole = crate::fit(&samples, &REGION, model, &[]).unwrap();

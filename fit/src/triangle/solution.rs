@@ -48,13 +48,24 @@ impl Solution {
     /// S = R⁻¹, upper triangular, so that the unknowns' covariance is S Sᵀ for rows of unit
     /// variance; packed by columns. Meaningful at full rank.
     pub fn inverse(&self) -> Vec<f64> {
-        let p = self.unknowns;
-        let mut inverse = Mat::<f64>::identity(p, p);
-        solve_upper_triangular_in_place(self.r(), inverse.as_mut(), Par::Seq);
+        let (p, inverse) = (self.unknowns, self.inverse_matrix());
         (0..p).flat_map(|j| (0..=j).map(move |i| (i, j))).map(|at| inverse[at]).collect()
     }
 
-    fn r(&self) -> MatRef<'_, f64> {
+    /// R⁻¹ as a matrix.
+    pub(crate) fn inverse_matrix(&self) -> Mat<f64> {
+        let mut inverse = Mat::<f64>::identity(self.unknowns, self.unknowns);
+        solve_upper_triangular_in_place(self.r(), inverse.as_mut(), Par::Seq);
+        inverse
+    }
+
+    /// The rotated right-hand side, over the unknowns.
+    pub(crate) fn rotated(&self, side: usize) -> Vec<f64> {
+        (0..self.unknowns).map(|i| self.whole[(i, self.unknowns + side)]).collect()
+    }
+
+    /// The triangle of the unknowns.
+    pub(crate) fn r(&self) -> MatRef<'_, f64> {
         self.whole.as_ref().get(..self.unknowns, ..self.unknowns)
     }
 }

@@ -10,7 +10,8 @@ fn c_deg(phi_rad: f64) -> f64 {
     let c_deg = (-phi_rad.to_degrees()).rem_euclid(360.0);
     // Radians to degrees and back costs a last digit, which nobody wrote.
     let rounded = (c_deg * 1e9).round() / 1e9;
-    if rounded >= 360.0 { 0.0 } else { rounded }
+    // Not -0 either, which is what the turn of +0 is.
+    if rounded >= 360.0 { 0.0 } else { rounded.abs() }
 }
 
 pub(super) fn angle_name(name: Option<&str>, phi_rad: f64, level: f64) -> String {

@@ -1,0 +1,258 @@
+//! Nested bases that share their rows: the largest one's rows are averaged over the beams once, and a
+//! smaller basis takes some of their columns. Scores a basis by the readings of sweeps left out.
+//!
+//! With coefficients of prior covariance (λP)⁻¹ and H = A C Aᵀ for whitened rows A and posterior C,
+//! a fold k of the readings, had it been left out, would have been predicted with errors
+//! (1 - Hₖₖ)⁻¹ rₖ of covariance (1 - Hₖₖ)⁻¹, r being the residuals of the fit of all: exactly, and
+//! without another fit (the block form of the identity for one reading, Cook and Weisberg 1982).
+
+use super::evidence::{Evidence, Likeliest};
+use crate::basis::Basis;
+use crate::beam::Optics;
+use crate::beam::design::Design;
+use crate::penalty::{Prior, Roughness};
+use crate::triangle::{Solution, Triangle};
+use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample};
+use faer::linalg::solvers::SolveCore;
+use faer::{Mat, Side};
+
+/// Whitened rows and values of the readings that a choice is made from.
+pub(super) struct Family {
+    spec: BasisSpec,
+    region: Region,
+    /// Readings by columns of the largest basis.
+    rows: Mat<f64>,
+    values: Vec<f64>,
+    u: Vec<f64>,
+}
+
+/// How a basis does.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Trial {
+    pub(super) penalty: Penalty,
+    pub(super) coefficients: usize,
+    /// Mean log density (Student's) of the readings left out, in units of their stated noise.
+    pub(super) score: f64,
+    /// RMS of their errors over their stated u.
+    pub(super) left_out: f64,
+    /// Mean square of the residuals beyond the stated noise, in the value's unit squared.
+    pub(super) misfit: f64,
+}
+
+/// What is to be tried of penalties.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strengths {
+    pub(super) power: Option<f64>,
+    pub(super) strength: Option<f64>,
+    /// The least variance of a reading over its stated one.
+    pub(super) scale_min: f64,
+}
+
+impl Family {
+    pub(super) fn new(
+        spec: BasisSpec,
+        region: &Region,
+        samples: &[Sample],
+        u: &[f64],
+        optics: Option<&Optics>,
+    ) -> Result<Self, FitError> {
+        spec.checked_len()?;
+        let basis = Basis::new(spec, *region)?;
+        let design = Design::new(samples, &basis, optics)?;
+        let (n, p) = (samples.len(), basis.len());
+        let mut rows = Mat::zeros(n, p);
+        let (mut room, mut row) = (design.room(), vec![0.0; p]);
+        for (i, u) in u.iter().enumerate() {
+            design.row(i, &mut room, &mut row);
+            for (j, value) in row.iter().enumerate() {
+                rows[(i, j)] = value / u;
+            }
+        }
+        let values = samples.iter().zip(u).map(|(s, u)| s.value / u).collect();
+        Ok(Self { spec, region: *region, rows, values, u: u.to_vec() })
+    }
+
+    /// Scores a basis of the family with the penalty that the data ask for.
+    pub(super) fn trial(
+        &self,
+        spec: BasisSpec,
+        strengths: Strengths,
+        folds: &[Vec<usize>],
+    ) -> Result<Option<Trial>, FitError> {
+        let basis = Basis::new(spec, self.region)?;
+        let rows = self.columns(spec);
+        let solution = triangle(&rows, &self.values).ok_or(FitError::OutOfRange)?;
+        let Some((penalty, scale)) = self.strength(&basis, &solution, strengths)? else {
+            return Ok(None);
+        };
+        // In units of the readings' real noise.
+        let whitened = Penalty { strength: penalty.strength * scale, ..penalty };
+        let prior = Prior::new(&basis, whitened)?;
+        let Some(found) = self.left_out(&rows, &solution, &prior, scale, folds) else {
+            return Ok(None);
+        };
+        let (score, left_out, misfit) = found;
+        Ok(Some(Trial { penalty, coefficients: basis.len(), score, left_out, misfit }))
+    }
+
+    /// The likeliest penalty, and the variance of the readings over their stated one.
+    fn strength(
+        &self,
+        basis: &Basis,
+        solution: &Solution,
+        strengths: Strengths,
+    ) -> Result<Option<(Penalty, f64)>, FitError> {
+        let n = self.values.len();
+        let is_held = strengths.power != Some(0.0) && strengths.strength != Some(0.0);
+        if !is_held || basis.len() == 1 {
+            let p = basis.len();
+            let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+            if n <= p || spectrum.rank() < p {
+                return Ok(None);
+            }
+            let scale = (solution.residual_squares(0) / (n - p) as f64).max(strengths.scale_min);
+            return Ok(Some((Penalty::NONE, scale)));
+        }
+        let splines = matches!(basis.spec().angular, Angular::Splines { .. });
+        let some = [strengths.power.unwrap_or_default()];
+        let powers: &[f64] = match strengths.power {
+            Some(_) => &some,
+            None if splines => &[2.0],
+            None => &POWERS,
+        };
+        let mut best: Option<(f64, Likeliest)> = None;
+        for &power in powers {
+            let roughness = Roughness::new(basis, power)?;
+            let evidence = Evidence::new(solution, n, strengths.scale_min, &roughness)?;
+            let found = match strengths.strength {
+                Some(strength) => Some(evidence.with(strength)),
+                None => evidence.likeliest(),
+            };
+            let Some(found) = found else { continue };
+            if best.is_none_or(|(_, best)| found.deviance < best.deviance) {
+                best = Some((power, found));
+            }
+        }
+        Ok(best.map(|(power, found)| (Penalty { power, strength: found.strength }, found.scale)))
+    }
+
+    /// Mean log density of the readings left out fold by fold, the RMS of their errors, and the
+    /// misfit.
+    fn left_out(
+        &self,
+        rows: &Mat<f64>,
+        whole: &Solution,
+        prior: &Prior,
+        scale: f64,
+        folds: &[Vec<usize>],
+    ) -> Option<(f64, f64, f64)> {
+        let p = rows.ncols();
+        let mut triangle = Triangle::new(p, 1);
+        let z = whole.rotated(0);
+        let mut row = vec![0.0; p + 1];
+        for (i, z) in z.iter().enumerate() {
+            for (j, out) in row[..p].iter_mut().enumerate() {
+                *out = if j < i { 0.0 } else { whole.r()[(i, j)] };
+            }
+            row[p] = *z;
+            triangle.absorb(&row);
+        }
+        prior.absorb_into(&mut triangle, 1);
+        let solution = triangle.solve()?;
+        let unknowns = solution.unknowns(0);
+        let c = Mat::from_fn(p, 1, |i, _| unknowns[i]);
+        let s = solution.inverse_matrix();
+        let fitted = rows * &c;
+        let spread = rows * &s;
+        let (mut score, mut squares, mut count) = (0.0, 0.0, 0);
+        for fold in folds {
+            let part = Mat::from_fn(fold.len(), p, |i, j| spread[(fold[i], j)]);
+            let mut kept = &part * part.transpose();
+            for i in 0..fold.len() {
+                for j in 0..fold.len() {
+                    kept[(i, j)] = f64::from(u8::from(i == j)) - kept[(i, j)];
+                }
+            }
+            let kept = kept.llt(Side::Lower).ok()?;
+            let mut covariance = Mat::<f64>::identity(fold.len(), fold.len());
+            kept.solve_in_place_with_conj(faer::Conj::No, covariance.as_mut());
+            for i in 0..fold.len() {
+                let residual = |k: usize| self.values[fold[k]] - fitted[(fold[k], 0)];
+                let error: f64 = (0..fold.len()).map(|k| covariance[(k, i)] * residual(k)).sum();
+                let variance = scale * covariance[(i, i)];
+                let surprise = libm::log(1.0 + error * error / (FREEDOM * variance));
+                score -= 0.5 * (libm::log(variance) + (FREEDOM + 1.0) * surprise);
+                squares += error * error;
+                count += 1;
+            }
+        }
+        let count = f64::from(count);
+        let is_sound = count > 0.0 && f64::is_finite(score);
+        is_sound.then(|| {
+            let misfit = self.misfit(&fitted, spread.squared_norm_l2());
+            (score / count, (squares / count).sqrt(), misfit)
+        })
+    }
+
+    /// Mean square of the residuals beyond the stated noise.
+    fn misfit(&self, fitted: &Mat<f64>, determined: f64) -> f64 {
+        let n = self.values.len() as f64;
+        let (mut squares, mut stated) = (0.0, 0.0);
+        for (i, (value, u)) in self.values.iter().zip(&self.u).enumerate() {
+            squares += (u * (value - fitted[(i, 0)])).powi(2);
+            stated += u * u / n;
+        }
+        (squares / (n - determined).max(1.0) - stated).max(0.0)
+    }
+
+    /// The columns of a smaller basis.
+    fn columns(&self, spec: BasisSpec) -> Mat<f64> {
+        if spec == self.spec {
+            return self.rows.clone();
+        }
+        let width = self.spec.angular.len();
+        let angular = angular_columns(self.spec.angular, spec.angular);
+        let places = match (self.spec.position, spec.position) {
+            (Position::Legendre { .. }, Position::Legendre { .. }) => spec.position.len(),
+            _ => self.rows.ncols() / width,
+        };
+        let columns: Vec<usize> =
+            (0..places).flat_map(|q| angular.iter().map(move |j| q * width + j)).collect();
+        Mat::from_fn(self.rows.nrows(), columns.len(), |i, j| self.rows[(i, columns[j])])
+    }
+}
+
+/// Places of a smaller basis's functions among a larger one's: both are ordered by degree, Zernike
+/// polynomials followed by their cosine columns.
+fn angular_columns(from: Angular, to: Angular) -> Vec<usize> {
+    match (from, to) {
+        (Angular::Zernike { degree: most, .. }, Angular::Zernike { degree, cosine_columns }) => {
+            let polynomials = |degree: usize| (degree + 1) * (degree + 2) / 2;
+            (0..polynomials(degree))
+                .chain(polynomials(most)..polynomials(most) + cosine_columns)
+                .collect()
+        }
+        _ => (0..to.len()).collect(),
+    }
+}
+
+fn triangle(rows: &Mat<f64>, values: &[f64]) -> Option<Solution> {
+    let p = rows.ncols();
+    let mut triangle = Triangle::new(p, 1);
+    let mut row = vec![0.0; p + 1];
+    for (i, value) in values.iter().enumerate() {
+        for (j, out) in row[..p].iter_mut().enumerate() {
+            *out = rows[(i, j)];
+        }
+        row[p] = *value;
+        triangle.absorb(&row);
+    }
+    triangle.solve()
+}
+
+/// Degrees of freedom of Student's density by which predictions are scored. A lobe narrower than the
+/// gap that a left-out sweep leaves surprises every basis: under a normal density the winner
+/// would be who calls all of the lobe noise.
+const FREEDOM: f64 = 4.0;
+/// Powers of the degree that a penalty is tried with: from fields with edges to very smooth ones.
+const POWERS: [f64; 3] = [1.0, 2.0, 3.0];

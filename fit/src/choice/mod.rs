@@ -1,0 +1,400 @@
+//! Which basis, how fine, and how strongly held: chosen from the data.
+//!
+//! Each candidate gets the penalty under which the data are likeliest ([`evidence`]). Candidates are
+//! compared by the log density that they give to the readings of whole sweeps left out ([`sweeps`],
+//! [`family`]): one that is right and knows how far it is right wins; one that follows the drift that a
+//! sweep shares, or that states too small an uncertainty, loses. Never single readings, whose
+//! neighbours give them away.
+
+mod evidence;
+mod family;
+mod sweeps;
+
+use crate::beam::Optics;
+use crate::check::check;
+use crate::grid::Grid;
+use crate::weights::{Model, has_unknown};
+use crate::{Angular, BasisSpec, FitError, Penalised, Penalty, Position, Region, Sample};
+use family::{Family, Strengths, Trial};
+
+pub use sweeps::SweepKind;
+pub(crate) use sweeps::Sweeps;
+
+/// A kind of functions of the direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AngularKind {
+    /// [`Angular::Zernike`].
+    Zernike,
+    /// [`Angular::Hemispherical`].
+    Hemispherical,
+    /// [`Angular::EvenHarmonics`].
+    EvenHarmonics,
+    /// [`Angular::Splines`].
+    Splines,
+}
+
+impl AngularKind {
+    /// All of them.
+    pub const ALL: [Self; 4] =
+        [Self::Zernike, Self::Hemispherical, Self::EvenHarmonics, Self::Splines];
+
+    /// As plans write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Zernike => "zernike",
+            Self::Hemispherical => "hemispherical",
+            Self::EvenHarmonics => "even-harmonics",
+            Self::Splines => "splines",
+        }
+    }
+}
+
+/// What a person has decided; the rest is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wish {
+    /// Which functions of the direction.
+    pub kind: Option<AngularKind>,
+    /// Their degree; splines have none. A degree without a kind means Zernike polynomials.
+    pub angular_degree: Option<usize>,
+    /// Total degree in the position.
+    pub position_degree: Option<usize>,
+    /// [`Penalty::power`]; 0 for none.
+    pub penalty_power: Option<f64>,
+    /// [`Penalty::strength`]; 0 for none. Of power 2 unless another is wished for.
+    pub penalty_strength: Option<f64>,
+}
+
+impl Wish {
+    /// The one model that is left; `None` if there is something to choose. Who names the degree
+    /// in direction gets plain least squares unless a penalty is named too.
+    pub fn decided(&self) -> Option<Penalised> {
+        let penalty = self.penalty()?;
+        let position = Position::Legendre { degree: self.position_degree? };
+        let degree = self.angular_degree?;
+        let angular = match self.kind.unwrap_or(AngularKind::Zernike) {
+            AngularKind::Zernike => Angular::Zernike { degree, cosine_columns: 0 },
+            AngularKind::Hemispherical => Angular::Hemispherical { degree },
+            AngularKind::EvenHarmonics => Angular::EvenHarmonics { degree },
+            AngularKind::Splines => return None,
+        };
+        Some(Penalised::new(BasisSpec { angular, position }, penalty))
+    }
+
+    fn penalty(&self) -> Option<Penalty> {
+        match (self.penalty_power, self.penalty_strength) {
+            (Some(0.0), _) | (_, Some(0.0)) => Some(Penalty::NONE),
+            (power, Some(strength)) => Some(Penalty { power: power.unwrap_or(2.0), strength }),
+            (None, None) if self.angular_degree.is_some() => Some(Penalty::NONE),
+            (_, None) => None,
+        }
+    }
+
+    fn strengths(&self, scale_min: f64) -> Strengths {
+        let (power, strength) = match self.penalty() {
+            Some(penalty) if penalty.is_none() => (Some(0.0), Some(0.0)),
+            Some(penalty) => (Some(penalty.power), Some(penalty.strength)),
+            None => (self.penalty_power, None),
+        };
+        Strengths { power, strength, scale_min }
+    }
+}
+
+/// What was chosen, from what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// How readings were taken to belong together.
+    pub sweeps: SweepKind,
+    /// How many sweeps there are among those readings.
+    pub n_sweeps: usize,
+    /// Readings that the choice was made from: of many, whole sweeps of them.
+    pub n_readings: usize,
+    /// All that was tried: the chosen one first, then by falling score.
+    pub candidates: Vec<Candidate>,
+}
+
+/// A basis that was tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// The basis, with the penalty that the data ask for in it.
+    pub model: Penalised,
+    /// Its coefficients.
+    pub coefficients: usize,
+    /// Mean log density of the readings of sweeps left out, less that of the chosen one; natural
+    /// logarithms a reading. A coarser basis may do better by up to 0.1: the chosen one is the finest
+    /// of its kind that does about as well as the best.
+    pub score: f64,
+    /// RMS error of predictions of the readings left out, over their stated u.
+    pub left_out_rms: f64,
+}
+
+/// Chooses what the wish leaves open, for samples as [`fit_seen`](crate::fit_seen) takes them. `None`
+/// for the choice where nothing was open.
+///
+/// The choice depends on the samples' order by rounding alone. It is made from at most 3000 readings,
+/// whole sweeps of them, and among bases of at most 400 coefficients (and no more than readings).
+pub fn choose(
+    samples: &[Sample],
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<(Penalised, Option<Choice>), FitError> {
+    if let Some(model) = wish.decided() {
+        return Ok((model, None));
+    }
+    check(samples, region, BasisSpec::zernike(0, 0).into(), &[])?;
+    let sweeps = Sweeps::of(samples, region).thinned(READINGS_MAX);
+    let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
+    let mut search = Search::new(&chosen, region, wish, optics, &sweeps);
+    search.run()?;
+    let Search { mut tried, .. } = search;
+    tried.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
+    prefer_finer(&mut tried);
+    let Some(&(_, best)) = tried.first() else {
+        // Nothing can be left out: the mean is all there is.
+        let degree = wish.angular_degree.unwrap_or(0);
+        let model = BasisSpec::zernike(degree, wish.position_degree.unwrap_or(0)).into();
+        return Ok((model, None));
+    };
+    let truncation = truncation(&tried);
+    let candidates = tried.iter().map(|(spec, trial)| Candidate {
+        model: Penalised::new(*spec, trial.penalty),
+        coefficients: trial.coefficients,
+        score: trial.score - best.score,
+        left_out_rms: trial.left_out,
+    });
+    let candidates: Vec<Candidate> = candidates.collect();
+    let choice = Choice {
+        sweeps: sweeps.kind,
+        n_sweeps: sweeps.members.len(),
+        n_readings: chosen.len(),
+        candidates,
+    };
+    let model = Penalised { truncation, ..choice.candidates[0].model };
+    Ok((model, Some(choice)))
+}
+
+/// Brings the finest basis of the best one's kind to the front that does about as well: what a basis
+/// can't follow no uncertainty of its coefficients holds, and a penalty keeps a finer one in check.
+fn prefer_finer(tried: &mut [(BasisSpec, Trial)]) {
+    let Some(&(best, trial)) = tried.first() else { return };
+    let is_as_good = |(spec, other): &(BasisSpec, Trial)| {
+        spec.angular.name() == best.angular.name()
+            && spec.position.len() >= best.position.len()
+            && !other.penalty.is_none()
+            && other.score > trial.score - FINER_COST
+    };
+    let finest = (0..tried.len())
+        .filter(|i| is_as_good(&tried[*i]))
+        .max_by_key(|i| tried[*i].1.coefficients);
+    if let Some(finest) = finest.filter(|i| tried[*i].1.coefficients > trial.coefficients) {
+        tried[..=finest].rotate_right(1);
+    }
+}
+
+/// What the chosen basis, the first, can't follow: of the residuals beyond the stated noise the part
+/// that falls as bases of its kind get finer. What stays is noise that was not stated (poses that
+/// jitter, a source that wavers), which is the fit's to find. Taken to fall with the square of the
+/// number of functions, as it does for fields with kinks.
+fn truncation(tried: &[(BasisSpec, Trial)]) -> f64 {
+    let Some(&(spec, chosen)) = tried.first() else { return 0.0 };
+    let coarser = tried.iter().filter(|(other, trial)| {
+        other.angular.name() == spec.angular.name()
+            && other.position == spec.position
+            && trial.coefficients as f64 * COARSER <= chosen.coefficients as f64
+    });
+    let Some((_, coarser)) = coarser.max_by_key(|(_, trial)| trial.coefficients) else {
+        return 0.0;
+    };
+    let ratio = chosen.coefficients as f64 / coarser.coefficients as f64;
+    let falling = (coarser.misfit - chosen.misfit) / (ratio * ratio - 1.0);
+    falling.clamp(0.0, chosen.misfit).sqrt()
+}
+
+/// The candidates tried so far.
+struct Search<'s> {
+    samples: &'s [Sample],
+    region: &'s Region,
+    wish: &'s Wish,
+    optics: Option<&'s Optics>,
+    u: Vec<f64>,
+    strengths: Strengths,
+    folds: Vec<Vec<usize>>,
+    /// Highest degree in position that is tried.
+    position_most: usize,
+    coefficients_max: usize,
+    tried: Vec<(BasisSpec, Trial)>,
+}
+
+impl<'s> Search<'s> {
+    fn new(
+        samples: &'s [Sample],
+        region: &'s Region,
+        wish: &'s Wish,
+        optics: Option<&'s Optics>,
+        sweeps: &Sweeps,
+    ) -> Self {
+        let model = Model::of(samples);
+        let grid = Grid::of(samples, region);
+        let distinct = grid.x_m.len().max(grid.y_m.len());
+        // What the residuals have to say about noise that is not stated.
+        let scale_min = if has_unknown(samples) { SCALE_LEAST } else { 1.0 };
+        Self {
+            samples,
+            region,
+            wish,
+            optics,
+            u: samples.iter().map(|sample| model.u_of(sample)).collect(),
+            strengths: wish.strengths(scale_min),
+            folds: sweeps.folds(FOLDS),
+            position_most: distinct.saturating_sub(1).min(POSITION_MOST),
+            coefficients_max: COEFFICIENTS_MAX.min(samples.len()),
+            tried: Vec::new(),
+        }
+    }
+
+    fn run(&mut self) -> Result<(), FitError> {
+        let position = self.position()?;
+        let kinds: &[AngularKind] = match self.wish.kind {
+            Some(AngularKind::Zernike) => &[AngularKind::Zernike],
+            Some(AngularKind::Hemispherical) => &[AngularKind::Hemispherical],
+            Some(AngularKind::EvenHarmonics) => &[AngularKind::EvenHarmonics],
+            Some(AngularKind::Splines) => &[AngularKind::Splines],
+            None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
+            None => &[AngularKind::Zernike, AngularKind::Hemispherical, AngularKind::Splines],
+        };
+        for kind in kinds {
+            self.rising(&self.angular(*kind), position)?;
+        }
+        // The best direction's basis may ask for another degree in position.
+        let best = self.tried.iter().max_by(|a, b| a.1.score.total_cmp(&b.1.score));
+        if let (Some((spec, _)), None) = (best, self.wish.position_degree) {
+            let (angular, degree) = (spec.angular, spec.position.degree().unwrap_or(0));
+            for degree in [degree.saturating_sub(1), degree + 1] {
+                self.rising(&[angular], degree)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The degree in position that a middling basis of the direction does best with.
+    fn position(&mut self) -> Result<usize, FitError> {
+        if let Some(degree) = self.wish.position_degree {
+            return Ok(degree);
+        }
+        let degree = self.wish.angular_degree.unwrap_or(MIDDLING).min(MIDDLING);
+        let columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
+        let angular = Angular::Zernike { degree, cosine_columns: columns };
+        let mut most = self.position_most;
+        let spec = |degree| BasisSpec { angular, position: Position::Legendre { degree } };
+        while most > 0 && spec(most).len() > self.coefficients_max {
+            most -= 1;
+        }
+        if most == 0 {
+            return Ok(0);
+        }
+        let family = Family::new(spec(most), self.region, self.samples, &self.u, self.optics)?;
+        let mut best = (0, f64::NEG_INFINITY);
+        for degree in 0..=most {
+            let Some(trial) = family.trial(spec(degree), self.strengths, &self.folds)? else {
+                break;
+            };
+            if trial.score <= best.1 {
+                break;
+            }
+            best = (degree, trial.score);
+        }
+        Ok(best.0)
+    }
+
+    /// Candidates of a kind, rising.
+    fn angular(&self, kind: AngularKind) -> Vec<Angular> {
+        let degrees = |list: &[usize]| match self.wish.angular_degree {
+            Some(degree) => vec![degree],
+            None => list.to_vec(),
+        };
+        let cosine_columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
+        match kind {
+            AngularKind::Zernike => degrees(&ZERNIKE)
+                .into_iter()
+                .map(|degree| Angular::Zernike { degree, cosine_columns })
+                .collect(),
+            AngularKind::Hemispherical => degrees(&HEMISPHERICAL)
+                .into_iter()
+                .map(|degree| Angular::Hemispherical { degree })
+                .collect(),
+            AngularKind::EvenHarmonics => degrees(&ZERNIKE)
+                .into_iter()
+                .map(|degree| Angular::EvenHarmonics { degree })
+                .collect(),
+            AngularKind::Splines => SPLINES
+                .into_iter()
+                .map(|(theta_spans, phi_spans)| Angular::Splines { theta_spans, phi_spans })
+                .collect(),
+        }
+    }
+
+    /// Tries ever finer bases until finer ones do no better.
+    fn rising(&mut self, list: &[Angular], degree: usize) -> Result<(), FitError> {
+        if degree > self.position_most && self.wish.position_degree.is_none() {
+            return Ok(());
+        }
+        let position = Position::Legendre { degree };
+        let affordable = |angular: &&Angular| {
+            BasisSpec { angular: **angular, position }.len() <= self.coefficients_max
+                || self.wish.angular_degree.is_some()
+        };
+        let list: Vec<Angular> = list.iter().filter(affordable).copied().collect();
+        let (mut best, mut worse) = (f64::NEG_INFINITY, 0);
+        let mut at = 0;
+        while at < list.len() && worse < WORSE_MAX {
+            // Splines are not nested; of the others a few at a time share rows.
+            let nested = list[at].degree().is_some();
+            let end = if nested { (at + SHARING).min(list.len()) } else { at + 1 };
+            let spec = BasisSpec { angular: list[end - 1], position };
+            let family = Family::new(spec, self.region, self.samples, &self.u, self.optics)?;
+            for angular in &list[at..end] {
+                let spec = BasisSpec { angular: *angular, position };
+                if worse == WORSE_MAX || self.tried.iter().any(|(tried, _)| *tried == spec) {
+                    continue;
+                }
+                let Some(trial) = family.trial(spec, self.strengths, &self.folds)? else {
+                    worse += 1;
+                    continue;
+                };
+                self.tried.push((spec, trial));
+                worse = if trial.score > best { 0 } else { worse + 1 };
+                best = best.max(trial.score);
+            }
+            at = end;
+        }
+        Ok(())
+    }
+}
+
+/// Readings that a choice is made from at most.
+const READINGS_MAX: usize = 3000;
+/// Coefficients of a basis that is chosen at most: what is finer has to be asked for by name.
+const COEFFICIENTS_MAX: usize = 400;
+/// Folds that the sweeps are dealt into.
+const FOLDS: usize = 16;
+/// Degrees tried in position at most: the sample is smooth, or it asks for splines by name.
+const POSITION_MOST: usize = 4;
+/// Degree in direction while that in position is looked for.
+const MIDDLING: usize = 6;
+/// Of every Zernike basis that is tried.
+const COSINE_COLUMNS: usize = 2;
+/// A basis with fewer functions by this factor is a coarser one.
+const COARSER: f64 = 1.2;
+/// What a finer basis may cost in log density a reading: a tenth of u.
+const FINER_COST: f64 = 0.1;
+/// A basis has to fail this often before finer ones are given up.
+const WORSE_MAX: usize = 3;
+/// Bases that share rows.
+const SHARING: usize = 5;
+const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
+const HEMISPHERICAL: [usize; 8] = [2, 4, 6, 8, 10, 12, 15, 18];
+/// Spans of θ, and of φ round the horizon.
+const SPLINES: [(usize, usize); 8] =
+    [(4, 8), (7, 12), (12, 8), (10, 16), (20, 10), (14, 20), (20, 16), (20, 26)];
+/// Of variances that nothing was stated about, in units of what they are taken for.
+const SCALE_LEAST: f64 = 1e-12;

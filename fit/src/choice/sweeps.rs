@@ -1,0 +1,221 @@
+//! Which readings belong together as one sweep, seen from their poses alone: what shares a sweep
+//! shares its drift, and a basis is judged by sweeps that it was not fitted to. The order of the
+//! readings plays no part.
+//!
+//! Readings at one place and one azimuth line are a sweep in θ; where a plan has none of these,
+//! readings at one place and one θ (a ring), or of one direction (a scan over the sample). A plan
+//! that has no such lines at all (low discrepancy, lists) is cut into blocks that hang together in
+//! direction and place.
+
+use crate::grid::Grid;
+use crate::{Ray, Region, Sample};
+
+/// How readings were found to belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SweepKind {
+    /// One place, one azimuth line (φ and φ + 180°), θ running.
+    Theta,
+    /// One place, one θ, φ running.
+    Phi,
+    /// One direction, the place running.
+    Place,
+    /// Blocks of neighbouring directions and places.
+    Block,
+}
+
+impl SweepKind {
+    /// As files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Theta => "sweeps in theta",
+            Self::Phi => "sweeps in phi",
+            Self::Place => "scans over the sample",
+            Self::Block => "blocks of neighbouring rays",
+        }
+    }
+}
+
+/// Readings by sweep.
+#[derive(Debug, Clone)]
+pub(crate) struct Sweeps {
+    pub(crate) kind: SweepKind,
+    /// Indices of the samples of each.
+    pub(crate) members: Vec<Vec<usize>>,
+}
+
+impl Sweeps {
+    pub(crate) fn of(samples: &[Sample], region: &Region) -> Self {
+        let grid = Grid::of(samples, region);
+        let rays: Vec<Ray> = samples.iter().map(|s| grid.snap(&s.ray)).collect();
+        let line = |ray: &Ray| key(ray.phi_rad.rem_euclid(core::f64::consts::PI));
+        let (x, y) = (|ray: &Ray| key(ray.x_m * 1e2), |ray: &Ray| key(ray.y_m * 1e2));
+        let theta = |ray: &Ray| key(ray.theta_rad);
+        let turn = |ray: &Ray| key(ray.phi_rad.rem_euclid(core::f64::consts::TAU));
+        let tries: [(SweepKind, Keys<'_>); 3] = [
+            (SweepKind::Theta, &|ray| [line(ray), x(ray), y(ray)]),
+            (SweepKind::Phi, &|ray| [theta(ray), x(ray), y(ray)]),
+            (SweepKind::Place, &|ray| [theta(ray), turn(ray), 0]),
+        ];
+        for (kind, key) in tries {
+            let members = by_key(&rays, key);
+            let long = members.iter().filter(|sweep| sweep.len() >= LENGTH_MIN);
+            let held: usize = long.clone().map(Vec::len).sum();
+            if long.count() >= SWEEPS_MIN && held as f64 >= HELD_MIN * rays.len() as f64 {
+                return Self { kind, members };
+            }
+        }
+        Self { kind: SweepKind::Block, members: blocks(samples, region) }
+    }
+
+    /// At most `most` readings in whole sweeps, evenly out of all of them.
+    pub(crate) fn thinned(mut self, most: usize) -> Self {
+        let total: usize = self.members.iter().map(Vec::len).sum();
+        if total > most {
+            let every = total.div_ceil(most);
+            self.members = self.members.into_iter().step_by(every).collect();
+        }
+        // A single sweep may be longer than all that is asked for.
+        let longest = (most / self.members.len().max(1)).max(1);
+        for sweep in &mut self.members {
+            let every = sweep.len().div_ceil(longest);
+            *sweep = sweep.iter().copied().step_by(every).collect();
+        }
+        self
+    }
+
+    /// The sweeps dealt into `count` folds, neighbouring ones into different folds. Indices count
+    /// the readings in the order of `members`.
+    pub(crate) fn folds(&self, count: usize) -> Vec<Vec<usize>> {
+        let mut folds = vec![Vec::new(); count.min(self.members.len())];
+        let mut at = 0;
+        let dealt = folds.len().max(1);
+        for (i, sweep) in self.members.iter().enumerate() {
+            folds[i % dealt].extend(at..at + sweep.len());
+            at += sweep.len();
+        }
+        folds.retain(|fold| !fold.is_empty());
+        folds
+    }
+}
+
+/// Numbers of order 1 that differ by rounding alone are one.
+#[allow(clippy::cast_possible_truncation)] // angles and metres
+fn key(value: f64) -> i64 {
+    libm::round(value * KEYS_PER_UNIT) as i64
+}
+
+/// What rays of one sweep share.
+type Keys<'k> = &'k dyn Fn(&Ray) -> [i64; 3];
+
+fn by_key(rays: &[Ray], key: Keys<'_>) -> Vec<Vec<usize>> {
+    let mut members = std::collections::BTreeMap::<[i64; 3], Vec<usize>>::new();
+    for (i, ray) in rays.iter().enumerate() {
+        members.entry(key(ray)).or_default().push(i);
+    }
+    let along = |ray: &Ray| [self::key(ray.theta_rad), self::key(ray.phi_rad)];
+    let mut members: Vec<Vec<usize>> = members.into_values().collect();
+    for sweep in &mut members {
+        sweep.sort_by_key(|i| along(&rays[*i]));
+    }
+    members
+}
+
+/// Halves the readings across the coordinate that varies most, again and again.
+fn blocks(samples: &[Sample], region: &Region) -> Vec<Vec<usize>> {
+    let places: Vec<[f64; 4]> = samples
+        .iter()
+        .map(|sample| {
+            let (sin, (s, c)) = (libm::sin(sample.ray.theta_rad), libm::sincos(sample.ray.phi_rad));
+            let (x, y) = region.scaled(&sample.ray);
+            [sin * c, sin * s, x, y]
+        })
+        .collect();
+    let mut blocks = vec![(0..samples.len()).collect::<Vec<usize>>()];
+    while blocks.len() < BLOCKS && blocks.iter().all(|block| block.len() >= 2 * LENGTH_MIN) {
+        blocks = blocks.into_iter().flat_map(|block| halves(block, &places)).collect();
+    }
+    blocks
+}
+
+fn halves(mut block: Vec<usize>, places: &[[f64; 4]]) -> [Vec<usize>; 2] {
+    let spread = |axis: usize| {
+        let values = block.iter().map(|i| places[*i][axis]);
+        let (low, high) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        high - low
+    };
+    let axis = (0..4).fold(0, |best, axis| if spread(axis) > spread(best) { axis } else { best });
+    let by_place = |a: &usize, b: &usize| {
+        let order = places[*a][axis].total_cmp(&places[*b][axis]);
+        order.then_with(|| {
+            let rest = places[*a].iter().zip(&places[*b]).map(|(a, b)| a.total_cmp(b));
+            rest.fold(core::cmp::Ordering::Equal, core::cmp::Ordering::then)
+        })
+    };
+    block.sort_by(by_place);
+    let upper = block.split_off(block.len() / 2);
+    [block, upper]
+}
+
+/// Fewer readings in a row are no sweep.
+const LENGTH_MIN: usize = 4;
+/// Fewer sweeps than these can't be left out one by one.
+const SWEEPS_MIN: usize = 4;
+/// The share of the readings that has to lie in sweeps.
+const HELD_MIN: f64 = 0.8;
+/// Blocks of a plan without sweeps.
+const BLOCKS: usize = 64;
+/// Angles closer than 5 µrad and places closer than 50 nm are equal once they are snapped to a grid.
+const KEYS_PER_UNIT: f64 = 2e5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Noise;
+
+    const REGION: Region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+
+    fn sample(x_m: f64, theta_deg: f64, phi_deg: f64) -> Sample {
+        let (theta_rad, phi_rad) = (theta_deg.to_radians(), phi_deg.to_radians());
+        let ray = Ray { x_m, y_m: 0.0, theta_rad, phi_rad };
+        Sample { ray, value: 1.0, noise: Noise::Unknown }
+    }
+
+    #[test]
+    fn meridians_of_a_raster_are_sweeps_whatever_their_order() {
+        let mut samples = Vec::new();
+        for x in [-0.005, 0.005] {
+            for phi in [0.0, 45.0, 90.0, 135.0, 180.0, 225.0] {
+                samples.extend((1..8).map(|i| sample(x, f64::from(i) * 10.0 + 0.004, phi + 0.003)));
+            }
+        }
+        let sweeps = Sweeps::of(&samples, &REGION);
+        assert_eq!(sweeps.kind, SweepKind::Theta);
+        // 0 and 180, 45 and 225 are one line each.
+        assert_eq!(sweeps.members.len(), 2 * 4);
+        samples.reverse();
+        let turned = Sweeps::of(&samples, &REGION);
+        let n = samples.len();
+        let back = |sweep: &Vec<usize>| sweep.iter().map(|i| n - 1 - i).collect::<Vec<usize>>();
+        assert_eq!(sweeps.members, turned.members.iter().map(back).collect::<Vec<_>>());
+        let folds = sweeps.folds(4);
+        assert_eq!(folds.iter().map(Vec::len).sum::<usize>(), n);
+    }
+
+    #[test]
+    fn scattered_readings_are_cut_into_blocks() {
+        let samples: Vec<Sample> = (0..200)
+            .map(|i| {
+                let t = f64::from(i);
+                sample(0.01 * libm::sin(t * 1.7), 40.0 + 35.0 * libm::sin(t * 0.77), t * 137.5)
+            })
+            .collect();
+        let sweeps = Sweeps::of(&samples, &REGION);
+        assert_eq!((sweeps.kind, sweeps.members.len()), (SweepKind::Block, 32));
+        let mut all: Vec<usize> = sweeps.members.iter().flatten().copied().collect();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..200));
+        let few = sweeps.thinned(50);
+        assert!(few.members.iter().map(Vec::len).sum::<usize>() <= 50);
+    }
+}

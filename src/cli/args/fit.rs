@@ -1,0 +1,86 @@
+//! The arguments of `gonio fit`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+#[derive(Debug, Args)]
+pub(crate) struct FitArgs {
+    /// A run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance. With --merge
+    /// the first partial fit.
+    #[arg(value_name = "DIR_or_CSV")]
+    pub(crate) source: PathBuf,
+    /// Further partial fits, with --merge.
+    #[arg(value_name = "PART", requires = "merge")]
+    pub(crate) further: Vec<PathBuf>,
+    /// Fit these samples as a share of more, and write what they say to -o, to be merged.
+    #[arg(long, requires = "output", conflicts_with_all = ["merge", "at", "json"])]
+    pub(crate) partial: bool,
+    /// Merge partial fits: the fit of all their samples.
+    #[arg(long, conflicts_with_all = ["basis", "angular_degree", "position_degree",
+        "penalty_power", "penalty_strength", "rig"])]
+    pub(crate) merge: bool,
+    /// With --partial of a CSV: from where to where all shares lie, the same for each.
+    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
+        allow_hyphen_values = true)]
+    pub(crate) x_mm: Option<(f64, f64)>,
+    /// As --x-mm.
+    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
+        allow_hyphen_values = true)]
+    pub(crate) y_mm: Option<(f64, f64)>,
+    /// With --partial of a CSV: the cone's half angle that all shares stand for.
+    #[arg(long, value_name = "DEG", requires = "partial")]
+    pub(crate) theta_max_deg: Option<f64>,
+    /// Functions of the direction: zernike, hemispherical, even-harmonics or splines. Default: what
+    /// the plan pins, or else the one that predicts left-out sweeps best.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) basis: Option<String>,
+    /// Degree of the functions of direction (Zernike's, unless --basis names others), without a
+    /// penalty unless one is given. Default: as for --basis.
+    #[arg(long, value_name = "N")]
+    pub(crate) angular_degree: Option<usize>,
+    /// Power of the degree that is held against rough fields, 0 to 8 (of splines 1 or 2); 0 for
+    /// plain least squares.
+    #[arg(long, value_name = "POWER", allow_negative_numbers = true)]
+    pub(crate) penalty_power: Option<f64>,
+    /// How strongly it is held: the inverse variance of a coefficient of degree 0.
+    #[arg(long, value_name = "STRENGTH", allow_negative_numbers = true)]
+    pub(crate) penalty_strength: Option<f64>,
+    /// Highest total degree of the polynomials over position.
+    #[arg(long, value_name = "N")]
+    pub(crate) position_degree: Option<usize>,
+    /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) at: Option<PathBuf>,
+    /// Derive a quantity with its uncertainty: "KIND KEY=VALUE ..." or a .toml file of [[derive]]
+    /// tables; may be given several times. Kinds: radiance, exitance, intensity, peak_intensity,
+    /// centre_beam_intensity, flux, irradiance, beam_angle, field_angle, environment, two_plane.
+    /// Example: --derive "irradiance at_mm=0,0,500 normal=0,0,-1"
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) derive: Vec<String>,
+    /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all. Of
+    /// partial fits --merge takes it.
+    #[arg(long, value_name = "U")]
+    pub(crate) u_relative: Option<f64>,
+    /// For a CSV: the rig whose detector read it (a file, or "simulated"), for its beam's width.
+    /// Default: a sample is the radiance along its ray.
+    #[arg(long, value_name = "RIG")]
+    pub(crate) rig: Option<PathBuf>,
+    /// Where to write fit.json. Default: the run's folder; of a CSV it is not written.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print fit.json.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Two numbers, a comma between.
+fn interval(text: &str) -> Result<(f64, f64), String> {
+    let numbers = || {
+        let (from, to) = text.split_once(',')?;
+        Some((from.trim().parse::<f64>().ok()?, to.trim().parse::<f64>().ok()?))
+    };
+    numbers()
+        .filter(|(from, to)| from.is_finite() && to.is_finite() && from <= to)
+        .ok_or_else(|| "expected from and to in mm with a comma between, -20,20 say".to_owned())
+}
