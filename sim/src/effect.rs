@@ -229,11 +229,16 @@ pub(crate) fn decide(
 fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
     let bound = candidate.bound();
     let can_be_left_out = !matches!(candidate.influence, Influence::Mandatory(_));
+    let changes_nothing = bound.is_some_and(|bound| bound.value <= 0.0);
     let Candidate { name, cause, error, how_in, how_out, .. } = candidate;
     let how = match why {
         Why::CalledFor => how_in,
         Why::Forced => format!("{how_in} (forced)"),
         Why::NotCalledFor => how_out,
+        // No tolerance is used up, and what a reading is taken for is what it is.
+        Why::BelowTolerance if changes_nothing => {
+            "left out: it changes nothing here".to_owned()
+        }
         Why::BelowTolerance => {
             let why =
                 format!("left out: what is left out stays within the tolerance of {tolerance:.1e}");
@@ -317,6 +322,18 @@ mod tests {
         assert_eq!(included(6.9e-4, &[], &[]).unwrap(), ["signal", "large", "small"]);
         assert_eq!(included(7.1e-4, &[], &[]).unwrap(), ["signal", "large"]);
         assert_eq!(included(1.0, &[], &[]).unwrap(), ["signal"]);
+    }
+
+    #[test]
+    fn what_changes_nothing_says_so_and_what_changes_little_names_the_tolerance() {
+        let of = |bound: f64| candidate("own", true, Influence::Relative(bound));
+        let how = |bound: f64, tolerance: f64| {
+            decide(vec![of(bound)], tolerance, &Terms::default()).unwrap().rows[0].how.clone()
+        };
+        assert_eq!(how(0.0, 1e-3), "left out: it changes nothing here");
+        assert_eq!(how(0.0, 0.0), "left out: it changes nothing here");
+        assert!(how(1e-300, 1e-3).contains("tolerance of 1.0e-3"), "{}", how(1e-300, 1e-3));
+        assert_eq!(how(1e-2, 1e-3), "in some way");
     }
 
     #[test]
