@@ -248,3 +248,30 @@ fn a_plan_of_sweeps_is_flown_in_the_time_that_was_predicted() {
     let _ = said.says(&["speed_deg_per_s", "at most 60.000°/s"]);
     assert!(!bench.names().iter().any(|name| name.starts_with("runs")), "nothing was begun");
 }
+
+#[test]
+fn a_run_killed_in_flight_is_carried_on_to_the_same_samples() {
+    let bench = Bench::of("led-lobe")
+        .with("rig.toml", "speed_deg_per_s = 60", "speed_deg_per_s = 600")
+        .with("rig.toml", "acceleration_deg_per_s2 = 120", "acceleration_deg_per_s2 = 6000")
+        .with("sweep.toml", "angular_degree = 10", "angular_degree = 4");
+    bench.gonio(&["run", "sweep.toml", "--out", "whole"]).well();
+    let mut command = bench.command(&["run", "sweep.toml", "--out", "out", "--realtime"]);
+    let mut run = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    // Homing takes three seconds, all sweeps some fifteen.
+    std::thread::sleep(Duration::from_secs(8));
+    run.kill().unwrap();
+    run.wait().unwrap();
+    bench.gonio(&["resume", "out"]).well();
+    let (whole, out) = (bench.text("whole/samples.csv"), bench.text("out/samples.csv"));
+    let (whole, out) = (rows(&whole), rows(&out));
+    assert_eq!(whole.len(), out.len());
+    for (one, other) in whole.iter().zip(&out) {
+        assert_eq!((one[0], one[6]), (other[0], other[6]), "each window once, with its own noise");
+    }
+    let sessions = bench.text("out/readings.csv");
+    let flown = |session: &str| {
+        rows(&sessions).iter().filter(|row| row[1] == "target" && row[4] == session).count()
+    };
+    assert!(flown("0") > 0 && flown("1") > 0, "{} and {}", flown("0"), flown("1"));
+}
