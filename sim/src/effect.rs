@@ -236,9 +236,7 @@ fn row(candidate: Candidate, why: Why, tolerance: f64) -> EffectRow {
         Why::Forced => format!("{how_in} (forced)"),
         Why::NotCalledFor => how_out,
         // No tolerance is used up, and what a reading is taken for is what it is.
-        Why::BelowTolerance if changes_nothing => {
-            "left out: it changes nothing here".to_owned()
-        }
+        Why::BelowTolerance if changes_nothing => "left out: it changes nothing here".to_owned(),
         Why::BelowTolerance => {
             let why =
                 format!("left out: what is left out stays within the tolerance of {tolerance:.1e}");

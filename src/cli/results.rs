@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{FitError, Optics, Penalised, Region, Wish};
+use fit::{Fit, FitError, Optics, Region, Wish};
 
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
@@ -58,9 +58,8 @@ impl Results {
         }
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
-        let model = fitted.as_ref().map_or_else(|_| wish.decided(), |f| Some(f.fit.model()));
-        let accuracy = model
-            .map_or_else(Vec::new, |model| accuracy(&calibrated, &region, model, optics.as_ref()));
+        let course = |fitted: &Fitted| accuracy(&calibrated, &region, &fitted.fit, optics.as_ref());
+        let accuracy = fitted.as_ref().map_or_else(|_| Vec::new(), course);
         let derived = fitted.as_ref().map_or_else(
             |_| Vec::new(),
             |fitted| derive(&fitted.fit, setup.rig.detector.quantity, &setup.plan.derive),
@@ -223,15 +222,18 @@ fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Op
     Some((stated, score))
 }
 
-/// Fits of the first readings in the basis that all of them chose, ever more of them: half as many for two points further back.
+/// Fits of the first readings in the basis that all of them chose, ever more of them: half as many
+/// for two points further back; the last is the fit of all, which is there.
 /// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
-/// of it is determined by its noise and its truncation alone, and is no point of the curve.
+/// of it is determined by its noise and its truncation alone, and is no point of the curve. Rows
+/// along the axes alone tell that beforehand, at a small part of the cost of beams that are cut.
 fn accuracy(
     calibrated: &Calibrated,
     region: &Region,
-    model: Penalised,
+    whole: &Fit,
     optics: Option<&Optics>,
 ) -> Vec<AccuracyPoint> {
+    let model = whole.model();
     let total = calibrated.samples.len();
     let mut counts: Vec<usize> = (0..ACCURACY_POINTS)
         .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
@@ -247,8 +249,15 @@ fn accuracy(
     let point = |count: usize| {
         let known = calibrated.first(count);
         let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
-        let fit = known.fit_as(region, model, optics).ok()?.fit;
-        (fit.condition() <= ACCURACY_CONDITION_MAX).then(|| AccuracyPoint {
+        let is_point = |fit: &Fit| fit.condition() <= ACCURACY_CONDITION_MAX;
+        let fit = if count == total {
+            whole.clone()
+        } else if is_point(&known.fit_as(region, model, None).ok()?.fit) {
+            known.fit_as(region, model, optics).ok()?.fit
+        } else {
+            return None;
+        };
+        is_point(&fit).then(|| AccuracyPoint {
             rig_s: last.fold(0.0, f64::max),
             readings: count as u64,
             exitance: fit.exitance(),

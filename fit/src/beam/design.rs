@@ -201,17 +201,18 @@ impl<'s> Design<'s> {
         room: &mut Room,
     ) -> f64 {
         let ray = &self.samples[i].ray;
-        let Some(Averaged { averager, kinds, .. }) =
+        let Some(Averaged { averager, .. }) =
             self.beam.as_ref().filter(|beam| matches!(beam.kinds[i], Kind::Across(_) | Kind::Off))
         else {
             return self.basis.value(coefficients, seen, &mut room.scratch)
                 - self.basis.value(coefficients, ray, &mut room.scratch);
         };
-        // The same rule for both, so that its error cancels.
-        let kind = if kinds[i] == Kind::Off { Kind::Across(0) } else { kinds[i] };
-        let level = self.level(i, coefficients, room);
-        averager.row(kind, seen, self.basis, &mut room.means, &mut room.row);
-        dot(&room.row, coefficients) - level
+        // The same rule for both, so that its error cancels: the coarsest is enough for a change.
+        let mut level = |ray: &Ray| {
+            averager.row(Kind::Across(0), ray, self.basis, &mut room.means, &mut room.row);
+            dot(&room.row, coefficients)
+        };
+        level(seen) - level(ray)
     }
 
     /// Whether an offset of all readings is a constant field: not where something cuts a beam.
