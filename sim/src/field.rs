@@ -81,6 +81,11 @@ pub(crate) trait Field: fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether a radiance costs so much that fewer rays are asked for when effects are weighed.
+    fn is_slow(&self) -> bool {
+        false
+    }
+
     /// The largest radiance of a region; no less than that of any landmark.
     fn brightest(&self, region: &Region) -> f64 {
         self.landmarks(region).iter().map(|ray| self.radiance(ray)).fold(0.0, f64::max)

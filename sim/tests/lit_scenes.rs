@@ -236,3 +236,43 @@ fn mistakes_of_lit_scenes_are_refused_with_their_place() {
         (format!("{PANEL}{LAMP}exitance_w_per_m2 = 2\n"), "scene.toml:11", "stated twice"),
     ]);
 }
+
+#[test]
+fn glossy_surfaces_that_are_not_simulated_are_refused_with_their_place() {
+    let glossy = "[[surface]]\nkind = \"glossy\"\nradius_mm = 1\nexponent = 20\nalbedo = 0.5\n";
+    let wall = |kind: &str| {
+        format!(
+            "[[surface]]\nkind = \"{kind}\n\
+             corners_mm = [[-30, -9, 0], [-30, 9, 0], [-30, 9, 9], [-30, -9, 9]]\n"
+        )
+    };
+    all_refused(&[
+        (
+            format!("{glossy}gloss = 0.1\n{LAMP}{}", wall("lambertian\"\nalbedo = 0.5")),
+            "scene.toml:2:8",
+            "between surface[0], glossy, and surface[1]",
+        ),
+        (
+            format!("{PANEL}{LAMP}{}", wall("glossy\"\ngloss = 0.5\nexponent = 9")),
+            "scene.toml:12:8",
+            "between surface[1], glossy, and surface[0]",
+        ),
+        (
+            format!(
+                "{glossy}gloss = 0.1\n[[lamp]]\nkind = \"environment\"\nfile = \"image.pgm\"\n\
+                     radiance_w_per_m2_sr = 1\n"
+            ),
+            "scene.toml:2:8",
+            "light of lamp[0], an environment, on surface[0], glossy",
+        ),
+        (
+            format!(
+                "{glossy}gloss = 0.1\n{LAMP}[[window]]\nz_mm = 9\nthickness_mm = 5\n\
+                 index = 1.5\nbelongs_to = \"sample\"\n"
+            ),
+            "scene.toml:2:8",
+            "surface[0], glossy, under window[0]",
+        ),
+    ]);
+    assert!(read(&format!("{glossy}gloss = 0.1\n{LAMP}")).is_ok());
+}

@@ -4,11 +4,10 @@
 
 use std::sync::Arc;
 
-use super::interreflection::facing;
 use super::{INTERREFLECTION, Included, LitScene, Scenery, landmarks, plain};
 use crate::compile::Setting;
 use crate::effect::{Candidate, Influence};
-use crate::field::Field;
+use crate::field::{Field, Ray};
 use crate::scene::{Body, Emitter, Scene, Solid, Surface, Window, WindowOwner};
 use crate::{CompileError, Region};
 
@@ -35,7 +34,9 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
     }
     let distance_m = Some(setting.nominal.detector.distance_m);
     let whole = LitScene::new(setting.scenery, distance_m, &|_| true)?;
-    let weighing = Weighing { setting, distance_m, whole: &whole };
+    let rays = whole.landmarks(&setting.region).into_iter();
+    let seen = rays.map(|ray| (ray, whole.radiance(&ray))).collect();
+    let weighing = Weighing { setting, distance_m, whole: &whole, seen };
     let mut found = Vec::new();
     for (i, lamp) in scene.lamps().iter().enumerate() {
         let lights = !scene.surfaces().is_empty() && lamp.radiance() > 0.0;
@@ -57,6 +58,9 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         let cause = weighing.in_beam(&format!("occluder[{i}]"), occluder.heights_m());
         let how = "black where a ray meets it before the detector";
         found.push(weighing.candidate(format!("beam-shadow[{i}]"), cause, how)?);
+    }
+    for i in 0..scene.surfaces().len() {
+        found.extend(weighing.gloss(i)?);
     }
     found.extend(weighing.interreflection()?);
     for (i, window) in scene.windows().iter().enumerate() {
@@ -82,10 +86,17 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
     Ok(found)
 }
 
+/// Rays on which the rule along outlines is held against a finer one.
+const LOBES: usize = 400;
+/// What is darker than this part of the brightest ray has its error beside that part.
+const DIM: f64 = 0.01;
+
 struct Weighing<'w> {
     setting: &'w Setting<'w>,
     distance_m: Option<f64>,
     whole: &'w LitScene,
+    /// Rays that tell most, and what is seen along them with everything in.
+    seen: Vec<(Ray, f64)>,
 }
 
 impl Weighing<'_> {
@@ -114,6 +125,29 @@ impl Weighing<'_> {
         })
     }
 
+    /// Of a glossy surface, with the error of its rule where the lobe is looked at.
+    fn gloss(&self, i: usize) -> Result<Option<Candidate>, CompileError> {
+        let reflection = self.setting.scene.surfaces()[i].reflection();
+        if reflection.is_lambertian() {
+            return Ok(None);
+        }
+        let cause = format!("surface[{i}].gloss = {}", reflection.gloss);
+        let how = "once along the outline of what is seen of each lamp, by Stokes, with 8 nodes on \
+                   pieces no longer than the lobe is wide";
+        let mut candidate = self.candidate(format!("gloss[{i}]"), Some(cause), how)?;
+        let mut finer = LitScene::new(self.setting.scenery, self.distance_m, &|_| true)?;
+        finer.refine_lobes();
+        let brightest = self.seen.iter().map(|(_, seen)| *seen).fold(0.0, f64::max);
+        let every = self.seen.len().div_ceil(LOBES).max(1);
+        let apart = self.seen.iter().step_by(every).map(|(ray, a)| {
+            let b = finer.radiance(ray);
+            let scale = a.max(b).max(self.setting.floor).max(DIM * brightest);
+            if scale > 0.0 { (a - b).abs() / scale } else { 0.0 }
+        });
+        candidate.error = Some(apart.fold(f64::EPSILON, f64::max));
+        Ok(Some(candidate))
+    }
+
     /// Of scenes with two surfaces or more.
     fn interreflection(&self) -> Result<Option<Candidate>, CompileError> {
         if self.setting.scene.surfaces().len() < 2 {
@@ -137,10 +171,9 @@ impl Weighing<'_> {
 
     /// The largest |with - without| / max(with, without, noise floor) over the region's rays.
     fn influence(&self, name: &str) -> Result<f64, CompileError> {
-        let (scenery, region) = (self.setting.scenery, &self.setting.region);
-        let without = LitScene::new(scenery, self.distance_m, &|other| other != name)?;
-        let largest = self.whole.landmarks(region).iter().fold(0.0, |largest: f64, ray| {
-            let (a, b) = (self.whole.radiance(ray), without.radiance(ray));
+        let without = LitScene::new(self.setting.scenery, self.distance_m, &|other| other != name)?;
+        let largest = self.seen.iter().fold(0.0, |largest: f64, (ray, a)| {
+            let b = without.radiance(ray);
             let scale = a.max(b).max(self.setting.floor);
             if scale > 0.0 { largest.max((a - b).abs() / scale) } else { largest }
         });
@@ -232,12 +265,10 @@ pub(super) fn returning(scene: &Scene) -> Result<Option<(usize, &Window)>, Compi
 
 /// What is not simulated, by name.
 pub(super) fn refuse(scene: &Scene) -> Result<(), CompileError> {
-    for (i, surface) in scene.surfaces().iter().enumerate() {
-        if !surface.reflection().is_lambertian() {
-            return Err(CompileError::Unsupported(format!("surface[{i}].kind = \"glossy\"")));
-        }
+    if let Some((_, what)) = scene.unsupported_gloss() {
+        return Err(CompileError::Unsupported(what));
     }
-    let pairs = facing(scene);
+    let pairs = scene.facing();
     let glass = scene.windows().iter().position(|w| w.belongs_to == WindowOwner::Sample);
     if let (Some((i, k)), Some(glass)) = (pairs.first(), glass) {
         return Err(CompileError::Unsupported(format!(

@@ -12,6 +12,7 @@ use radiometry::quantity::{ProjectedSolidAngle, Radiance};
 use radiometry::shape::{Polygon, Sphere};
 use radiometry::{EstimateError, Tolerance};
 
+use super::gloss::{Lobe, Sight};
 use super::plate::Plate;
 use super::{Included, occluder_of};
 use crate::CompileError;
@@ -61,6 +62,9 @@ struct LitBy {
     source: Arc<Source>,
     /// What may hide a part of it from a part of the surface, and their names.
     before: Vec<Occluder>,
+    hiding: Vec<Sight>,
+    /// The source as lobes see it; none of a surrounding.
+    sight: Option<Sight>,
     names: Vec<String>,
     /// What hides all of it from all of the surface.
     umbra_of: Option<String>,
@@ -227,7 +231,7 @@ impl Lighting {
             source.emitter.as_ref().is_none_or(|emitter| emitter.faces(surface.body()))
         };
         for source in sources.iter().filter(reaches) {
-            let (mut before, mut names) = (Vec::new(), Vec::new());
+            let (mut before, mut names, mut hiding) = (Vec::new(), Vec::new(), Vec::new());
             let mut umbra_of = None;
             for (k, (name, solid)) in scene.opaque().iter().enumerate() {
                 let is_out = name
@@ -243,11 +247,13 @@ impl Lighting {
                     RegionShadow::Mixed => {
                         source.can_be_shaded(scene, name, solid)?;
                         before.push(occluder);
+                        hiding.push(Sight::Body(solid.clone()));
                         names.push(name.clone());
                     }
                 }
             }
-            by.push(LitBy { source: Arc::clone(source), before, names, umbra_of });
+            let (source, sight) = (Arc::clone(source), source.sight());
+            by.push(LitBy { source, before, hiding, sight, names, umbra_of });
         }
         Ok(Self { by })
     }
@@ -268,6 +274,23 @@ impl Lighting {
             );
         }
         shades
+    }
+
+    /// Radiance of a lobe about the mirror direction, in the scene's unit.
+    pub(super) fn glossy(&self, lobe: &Lobe<'_>, place: DVec3) -> f64 {
+        self.by.iter().map(|by| by.glossy(lobe, place)).sum()
+    }
+
+    /// Directions of some points of each source.
+    pub(super) fn towards(&self, place: DVec3) -> Vec<DVec3> {
+        let of = |by: &LitBy| match &by.sight {
+            Some(Sight::Cap(towards, _)) => vec![*towards],
+            Some(Sight::Body(solid)) => {
+                solid.points().into_iter().map(|point| (point - place).normalize()).collect()
+            }
+            None => Vec::new(),
+        };
+        self.by.iter().flat_map(of).filter(|towards| towards.is_finite()).collect()
     }
 
     /// W·m⁻² or lm·m⁻².
@@ -309,6 +332,20 @@ impl Source {
             }
             SourceKind::Surrounding(_) => None,
         }
+    }
+
+    /// As lobes see it.
+    fn sight(&self) -> Option<Sight> {
+        let solid = match &self.kind {
+            SourceKind::Body(Shining::Disk(disk), _) => Solid::Disk(*disk),
+            SourceKind::Body(Shining::Sphere(ball), _) => Solid::Sphere(*ball),
+            SourceKind::Body(Shining::Polygon(polygon), _) => Solid::Polygon(polygon.clone()),
+            SourceKind::Distant { towards, half_angle_rad, .. } => {
+                return Some(Sight::Cap(*towards, *half_angle_rad));
+            }
+            SourceKind::Surrounding(_) => return None,
+        };
+        Some(Sight::Body(solid))
     }
 
     /// Whether a body leaves a region lit, dark, or neither for certain.
@@ -353,6 +390,20 @@ impl Source {
 }
 
 impl LitBy {
+    fn glossy(&self, lobe: &Lobe<'_>, place: DVec3) -> f64 {
+        let passes = match &self.source.kind {
+            SourceKind::Body(_, Some((point, front))) if front.dot(place - *point) <= 0.0 => 0.0,
+            SourceKind::Distant { transmittance, .. } => *transmittance,
+            SourceKind::Body(..) | SourceKind::Surrounding(_) => 1.0,
+        };
+        // A surrounding is refused before glossy surfaces.
+        let Some(sight) = self.sight.as_ref().filter(|_| self.umbra_of.is_none() && passes > 0.0)
+        else {
+            return 0.0;
+        };
+        self.source.radiance * passes * lobe.radiance(sight, &self.hiding)
+    }
+
     fn irradiance(&self, place: DVec3, normal: DVec3) -> f64 {
         if self.umbra_of.is_some() {
             return 0.0;

@@ -21,10 +21,17 @@ const LEANS: u32 = 3;
 const TURNS: u32 = 8;
 /// Steps along each side where nothing is known of shadows.
 const STEPS: u32 = 16;
+/// Of slow fields every so many rays of the grid: prime to its directions.
+const SPARSE: usize = 7;
+/// Places along each side of a region from which the mirror images of lamps are looked at.
+const GLINTS: u32 = 5;
 
 pub(super) fn of(lit: &LitScene, region: &Region) -> Vec<Ray> {
-    let mut rays = if lit.is_even() { Vec::new() } else { grid(region) };
+    let every = if lit.is_slow() { SPARSE } else { 1 };
+    let all = if lit.is_even() { Vec::new() } else { grid(region) };
+    let mut rays: Vec<Ray> = all.into_iter().step_by(every).collect();
     rays.extend(towards_bodies(lit, region));
+    rays.extend(glints(lit, region));
     if lit.flat.iter().any(|part| matches!(part.glow, Glow::Lit(_))) {
         let at =
             |(low, high): (f64, f64), i: u32| low + (high - low) * f64::from(i) / f64::from(STEPS);
@@ -36,12 +43,44 @@ pub(super) fn of(lit: &LitScene, region: &Region) -> Vec<Ray> {
         for cell in shaded(lit, region) {
             let (x, y) = cell.middle();
             rays.push(Ray::new(x, y, 0.0, 0.0));
-            rays.extend(cell.corners().map(|(x, y)| Ray::new(x, y, 0.0, 0.0)));
+            if !lit.is_slow() {
+                rays.extend(cell.corners().map(|(x, y)| Ray::new(x, y, 0.0, 0.0)));
+            }
         }
     }
     if let Some(interreflection) = &lit.interreflection {
         let places = interreflection.places();
         rays.extend(places.into_iter().flat_map(|place| towards(place, region)));
+    }
+    rays
+}
+
+/// From places of glossy surfaces into directions in which what shines on them is mirrored: there a lobe
+/// is brightest, and what stands before a lamp hides most of it.
+fn glints(lit: &LitScene, region: &Region) -> Vec<Ray> {
+    let at =
+        |(low, high): (f64, f64), i: u32| low + (high - low) * f64::from(i) / f64::from(GLINTS - 1);
+    let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
+    let mut rays = Vec::new();
+    for part in lit.flat.iter().chain(&lit.raised) {
+        let Glow::Lit(Lit { lighting, gloss: Some(_), .. }) = &part.glow else { continue };
+        let places: Vec<DVec3> = match &part.body {
+            Body::Raised(solid) => solid.points(),
+            Body::Flat(_) => (0..GLINTS * GLINTS)
+                .map(|i| DVec3::new(at(region.x_m, i / GLINTS), at(region.y_m, i % GLINTS), 0.0))
+                .collect(),
+        };
+        for place in places {
+            let normal = part.body.normal(place);
+            rays.extend(lighting.towards(place).into_iter().filter_map(|towards| {
+                let into = normal * (2.0 * normal.dot(towards)) - towards;
+                let ray = Ray::through(place, into)?;
+                let is_seen = angles(into).0 <= region.theta_max_rad
+                    && within(region.x_m, ray.point.x)
+                    && within(region.y_m, ray.point.y);
+                is_seen.then_some(ray)
+            }));
+        }
     }
     rays
 }

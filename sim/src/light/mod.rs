@@ -3,6 +3,7 @@
 //! how far away that stands.
 
 mod effects;
+mod gloss;
 mod interreflection;
 mod lamps;
 mod landmarks;
@@ -24,6 +25,7 @@ pub(crate) use scenery::Scenery;
 use crate::field::{Field, Ray};
 use crate::scene::{Body, Emitter, Law, Reflection, Scene, Solid, WindowOwner};
 use crate::{CompileError, Region};
+use gloss::Gloss;
 use interreflection::Interreflection;
 use lamps::Lighting;
 use plate::Plate;
@@ -76,6 +78,8 @@ struct Lit {
     surface: usize,
     reflection: Reflection,
     lighting: Arc<Lighting>,
+    /// Its lobe, if it has one.
+    gloss: Option<Gloss>,
 }
 
 impl LitScene {
@@ -94,7 +98,9 @@ impl LitScene {
         let lightings = Lighting::all(scene, is_in)?;
         for (i, surface) in scene.surfaces().iter().enumerate() {
             let lighting = Arc::clone(&lightings[i]);
-            let glow = Glow::Lit(Lit { surface: i, reflection: *surface.reflection(), lighting });
+            let reflection = *surface.reflection();
+            let gloss = Gloss::new(&reflection).filter(|_| is_in(&format!("gloss[{i}]")));
+            let glow = Glow::Lit(Lit { surface: i, reflection, lighting, gloss });
             parts.push(Part { name: format!("surface[{i}]"), body: surface.body().clone(), glow });
         }
         if distance_m.is_some() {
@@ -121,6 +127,17 @@ impl LitScene {
         let mut lit = Self { flat, raised, plates, returned: None, interreflection, reach_m };
         lit.returned = lit.thrown_back(scene, is_in)?;
         Ok(lit)
+    }
+
+    /// With more nodes over each lobe.
+    fn refine_lobes(&mut self) {
+        for part in self.flat.iter_mut().chain(&mut self.raised) {
+            if let Glow::Lit(lit) = &mut part.glow
+                && let Some(gloss) = &mut lit.gloss
+            {
+                *gloss = gloss.finer();
+            }
+        }
     }
 
     /// Of the sample's window, if it has one and patches that it can light.
@@ -185,7 +202,11 @@ impl LitScene {
                 if let Some(others) = &self.interreflection {
                     arriving += others.irradiance(lit.surface, place);
                 }
-                lit.reflection.albedo / PI * arriving
+                let mut radiance = lit.reflection.albedo / PI * arriving;
+                if let Some(gloss) = &lit.gloss {
+                    radiance += lit.lighting.glossy(&gloss.lobe(place, normal, direction), place);
+                }
+                radiance
             }
         }
     }
@@ -251,10 +272,15 @@ impl Field for LitScene {
         self.of_flat_patch(patch, ray)
     }
 
+    fn is_slow(&self) -> bool {
+        let mut parts = self.flat.iter().chain(&self.raised);
+        parts.any(|part| matches!(&part.glow, Glow::Lit(lit) if lit.gloss.is_some()))
+    }
+
     fn is_even(&self) -> bool {
         let is_even = |part: &Part| match &part.glow {
             Glow::Emits(emitter) => *emitter.law() == Law::Lambertian,
-            Glow::Lit(lit) => lit.reflection.is_lambertian(),
+            Glow::Lit(lit) => lit.gloss.is_none(),
             Glow::Black | Glow::Lamp(_) => true,
         };
         self.plates.is_empty() && self.raised.is_empty() && self.flat.iter().all(is_even)

@@ -27,7 +27,7 @@ fn patch(i: usize, part: &Part) -> Option<Patch> {
             Patch::of_emitter(i, emitter).map(|own| Patch { name: part.name.clone(), ..own })
         }
         Glow::Lit(lit) => {
-            let is_lambertian = lit.reflection.is_lambertian();
+            let is_lambertian = lit.gloss.is_none();
             let goes = if is_lambertian { Goes::WithPlace } else { Goes::WithBoth };
             Some(Patch::new(part.name.clone(), part.body.shape()?, goes))
         }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::effects;
-use super::interreflection::{Aim, Exchange, facing};
+use super::interreflection::{Aim, Exchange};
 use super::lamps::Lighting;
 use crate::CompileError;
 use crate::scene::Scene;
@@ -31,7 +31,7 @@ impl Scenery {
 
     /// Whether there are surfaces that light each other.
     pub(crate) fn sees_itself(&self) -> bool {
-        !facing(&self.scene).is_empty()
+        !self.scene.facing().is_empty()
     }
 
     /// With light between surfaces, for a tolerance of which its error takes a quarter;

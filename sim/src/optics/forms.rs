@@ -28,10 +28,17 @@ const FINEST_PLACES: (usize, usize) = (79, 5);
 const BOTH: [(usize, usize); 8] =
     [(3, 1), (3, 3), (5, 3), (7, 3), (7, 5), (9, 5), (14, 7), (14, 14)];
 const FINEST_BOTH: (usize, usize) = (20, 20);
+/// Of these so many compete in slow fields, and with what.
+const SLOW_BOTH: usize = 6;
+const SLOW_FINEST_BOTH: (usize, usize) = (14, 7);
 /// Degrees over the pupil, with chords and points along them, across outlines.
 const ACROSS: [(usize, (usize, usize)); 7] =
     [(3, (8, 2)), (3, (8, 4)), (5, (8, 4)), (7, (8, 4)), (9, (8, 4)), (14, (8, 4)), (14, (12, 8))];
 const FINEST_ACROSS: (usize, (usize, usize)) = (20, (16, 8));
+/// Of these so many compete in slow fields, with what, and on how many rays.
+const SLOW_ACROSS: usize = 4;
+const SLOW_FINEST_ACROSS: (usize, (usize, usize)) = (14, (8, 4));
+const WORST_SLOW_ACROSS: usize = 4;
 /// How much farther off than from the finest rule another rule may be next to outlines.
 const OUTLINES: f64 = 2.0;
 /// How many rays are looked at with the finest rule: of cheap fields, across outlines, and of slow
@@ -207,8 +214,7 @@ pub(super) fn choose(setting: &Setting<'_>, beam: Beam, seen: &Seen) -> (Form, O
     let Some(patches) = setting.field.patches() else {
         let rays = anywhere_rays(setting);
         let build = |(stop, pupil)| seen.build(beam, Form::Rays(stop, pupil));
-        let ((stop, pupil), error) =
-            Contest { setting, rays: &rays, count: WORST_SLOW }.cheapest(&BOTH, FINEST_BOTH, build);
+        let ((stop, pupil), error) = of_both(setting, &rays, build);
         // Next to an outline the finest rule is off as well, by less.
         return (Form::Rays(stop, pupil), error.times(OUTLINES));
     };
@@ -244,11 +250,15 @@ pub(super) fn choose(setting: &Setting<'_>, beam: Beam, seen: &Seen) -> (Form, O
     let rays = across_rays(setting, &beam, &patches);
     let across =
         |(pupil, chords)| seen.build(beam, Form::Patches(Degrees { pupil, chords, ..degrees }, 0));
-    let ((pupil, chords), error) = Contest { setting, rays: &rays, count: WORST_ACROSS }.cheapest(
-        &ACROSS,
-        FINEST_ACROSS,
-        across,
-    );
+    let (count, family, finest) = if setting.field.is_slow() {
+        (WORST_SLOW_ACROSS, &ACROSS[..SLOW_ACROSS], SLOW_FINEST_ACROSS)
+    } else {
+        (WORST_ACROSS, &ACROSS[..], FINEST_ACROSS)
+    };
+    let every = if setting.field.is_slow() { rays.len().div_ceil(count).max(1) } else { 1 };
+    let rays: Vec<Ray> = rays.into_iter().step_by(every).collect();
+    let contest = Contest { setting, rays: &rays, count };
+    let ((pupil, chords), error) = contest.cheapest(family, finest, across);
     (Form::Patches(Degrees { pupil, chords, ..degrees }, seen.cells), error.max(worst))
 }
 
@@ -257,11 +267,15 @@ fn over_places(setting: &Setting<'_>, beam: Beam, seen: &Seen) -> ((usize, usize
     let rays = anywhere_rays(setting);
     let of = |seen: &Seen, (stop, pupil)| seen.build(beam, Form::Rays(stop, pupil));
     if !seen.has_tables() {
-        let contest = Contest { setting, rays: &rays, count: WORST_SLOW };
-        return contest.cheapest(&BOTH, FINEST_BOTH, |degrees| of(seen, degrees));
+        return of_both(setting, &rays, |degrees| of(seen, degrees));
     }
-    let contest = Contest { setting, rays: &rays, count: WORST };
-    let (best, error) = contest.cheapest(&PLACES, FINEST_PLACES, |degrees| of(seen, degrees));
+    let (best, error) = if setting.field.is_slow() {
+        // Beside patches with tables there are slow ones.
+        of_both(setting, &rays, |degrees| of(seen, degrees))
+    } else {
+        let contest = Contest { setting, rays: &rays, count: WORST };
+        contest.cheapest(&PLACES, FINEST_PLACES, |degrees| of(seen, degrees))
+    };
     // By the same rays, with and without tables.
     let bare = Seen::bare(setting);
     let (tabled, direct) = (of(seen, COMPARED), of(&bare, COMPARED));
@@ -271,6 +285,19 @@ fn over_places(setting: &Setting<'_>, beam: Beam, seen: &Seen) -> ((usize, usize
         Off::between(setting, tabled.radiance(&axis), direct.radiance(&axis))
     });
     (best, error.plus(off.fold(Off::NONE, Off::max).times(MARGIN)))
+}
+
+/// Rays over what is read from no tables.
+fn of_both(
+    setting: &Setting<'_>,
+    rays: &[Ray],
+    build: impl Fn((usize, usize)) -> Arc<dyn Optics>,
+) -> ((usize, usize), Off) {
+    let contest = Contest { setting, rays, count: WORST_SLOW };
+    if setting.field.is_slow() {
+        return contest.cheapest(&BOTH[..SLOW_BOTH], SLOW_FINEST_BOTH, build);
+    }
+    contest.cheapest(&BOTH, FINEST_BOTH, build)
 }
 
 /// The rule by which tables are compared with what they stand for.

@@ -14,6 +14,8 @@ use crate::field::{Patch, Ray};
 /// Of the field's landmarks at most, and rays elsewhere.
 const LANDMARKS: usize = 400;
 const ANYWHERE: u32 = 400;
+/// What part of either is looked at in slow fields.
+const SLOW: u32 = 5;
 /// Directions round the normal.
 const AZIMUTHS: u32 = 32;
 /// Parts of the region that a climb begins and ends with.
@@ -34,9 +36,10 @@ pub(super) fn anywhere_rays(setting: &Setting<'_>) -> Vec<Ray> {
     const ROOT: f64 = 1.167_303_978_261_418_7;
     let Region { x_m, y_m, theta_max_rad } = setting.region;
     let landmarks = setting.field.landmarks(&setting.region);
-    let every = landmarks.len().div_ceil(LANDMARKS).max(1);
+    let part = if setting.field.is_slow() { SLOW } else { 1 };
+    let every = landmarks.len().div_ceil(LANDMARKS / part as usize).max(1);
     let mut rays: Vec<Ray> = landmarks.into_iter().step_by(every).collect();
-    for i in 1..=ANYWHERE {
+    for i in 1..=ANYWHERE / part {
         let part = |k: i32| {
             let at = f64::from(i) * libm::pow(ROOT, -f64::from(k));
             at - libm::floor(at)

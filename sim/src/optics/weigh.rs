@@ -28,6 +28,8 @@ const FINE: (usize, usize) = (20, 5);
 /// How many of the worst rays are climbed from, and how many are asked for slivers.
 const CLIMBS: usize = 5;
 const SLIVERS_SOUGHT: usize = 60;
+/// What part of either, and of the rays, is looked at in slow fields.
+const SLOW: usize = 4;
 /// The degree of the pupil's rule that sees slivers of a beam.
 const SLIVERS: usize = 25;
 /// From here on a dozen points of the pupil tell as much.
@@ -111,7 +113,10 @@ fn over_patches(
         Some((_, _, Goes::Even(_))) | None => {}
     }
     if let Some(first) = near.first() {
-        bound = bound.max(largest_across(setting, beam, seen, patches));
+        // What is slow is not looked at over outlines: all of it may be behind one.
+        let is_slow = setting.field.is_slow();
+        let across = if is_slow { 1.0 } else { largest_across(setting, beam, seen, patches) };
+        bound = bound.max(across);
         fact =
             format!("the footprint, up to {mm:.1} mm wide, reaches the outline of {}", first.name);
     }
@@ -122,21 +127,23 @@ fn over_patches(
 /// anywhere, with so many rays that a sliver is seen.
 fn anywhere(setting: &Setting<'_>, beam: &Beam, seen: &Seen) -> f64 {
     let point = PointSampled(Arc::clone(&seen.field));
+    let part = if setting.field.is_slow() { SLOW } else { 1 };
     let mut rays = anywhere_rays(setting);
-    rays.extend(setting.field.details(&setting.region));
+    rays.extend(setting.field.details(&setting.region).into_iter().step_by(part));
     let by = |(stop, pupil)| seen.build(*beam, Form::Rays(stop, pupil));
     let coarse = by(COARSE);
     let off = |ray: &Ray| departure(setting, &*coarse, &point, ray);
     let mut tried: Vec<(f64, &Ray)> = rays.iter().map(|ray| (off(ray), ray)).collect();
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let found = tried.iter().take(CLIMBS).map(|(_, ray)| uphill(setting, ray, &off));
+    let climbs = CLIMBS.div_ceil(part);
+    let found = tried.iter().take(climbs).map(|(_, ray)| uphill(setting, ray, &off));
     let found = found.fold(0.0, f64::max);
     if found > NO_SLIVER {
         return MARGIN * found;
     }
     let fine = by(FINE);
-    let every = rays.len().div_ceil(SLIVERS_SOUGHT).max(1);
-    let some = tried.iter().take(CLIMBS).chain(tried.iter().step_by(every));
+    let every = rays.len().div_ceil(SLIVERS_SOUGHT / part).max(1);
+    let some = tried.iter().take(climbs).chain(tried.iter().step_by(every));
     let fine = some.map(|(_, ray)| departure(setting, &*fine, &point, ray)).fold(found, f64::max);
     MARGIN * fine
 }

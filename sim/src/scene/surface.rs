@@ -1,6 +1,6 @@
 //! What reflects: a body, and how. It emits nothing of its own.
 
-use super::{Body, EXPONENT_MAX, SceneError};
+use super::{Body, EXPONENT_MAX, LampSource, Scene, SceneError, WindowOwner};
 
 /// A surface that is lit.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,5 +68,45 @@ impl Surface {
             return Err(SceneError::Exponent(exponent));
         }
         Ok(())
+    }
+}
+
+impl Scene {
+    /// The pairs of surfaces of which each lies before the other, and both reflect.
+    pub(crate) fn facing(&self) -> Vec<(usize, usize)> {
+        let reflects = |surface: &Surface| surface.reflection().reflectance_bound() > 0.0;
+        let surfaces = self.surfaces();
+        let mut pairs = Vec::new();
+        for (i, surface) in surfaces.iter().enumerate() {
+            for (k, other) in surfaces.iter().enumerate().skip(i + 1) {
+                if reflects(surface) && reflects(other) && surface.body().faces(other.body()) {
+                    pairs.push((i, k));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// A glossy surface, and what is not simulated of the light on it, if that is so.
+    pub(crate) fn unsupported_gloss(&self) -> Option<(usize, String)> {
+        let is_glossy = |i: usize| !self.surfaces()[i].reflection().is_lambertian();
+        let i = (0..self.surfaces().len()).find(|i| is_glossy(*i))?;
+        if let Some((a, b)) =
+            self.facing().into_iter().find(|(a, b)| is_glossy(*a) || is_glossy(*b))
+        {
+            let (own, other) = if is_glossy(a) { (a, b) } else { (b, a) };
+            let what = format!("light between surface[{own}], glossy, and surface[{other}]");
+            return Some((own, what));
+        }
+        let is_sky = |source: &LampSource| matches!(source, LampSource::Surrounding(_));
+        if let Some(k) = self.lamps().iter().position(|lamp| is_sky(lamp.source())) {
+            return Some((
+                i,
+                format!("light of lamp[{k}], an environment, on surface[{i}], glossy"),
+            ));
+        }
+        let glass = |owner| owner == WindowOwner::Sample;
+        let k = self.windows().iter().position(|window| glass(window.belongs_to))?;
+        Some((i, format!("surface[{i}], glossy, under window[{k}] of the sample")))
     }
 }

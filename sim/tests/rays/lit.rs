@@ -58,6 +58,33 @@ fn a_lambertian_panel_is_as_bright_as_every_lamp_makes_it() {
     }
 }
 
+const GLOSSY: &str = "[[surface]]\nkind = \"glossy\"\nalbedo = 0.2\ngloss = 0.6\nexponent = 12\n\
+                      x_mm = [-50, 50]\ny_mm = [-50, 50]\n";
+
+#[test]
+fn a_glossy_panel_sends_on_what_its_lobe_says() {
+    // Towards the lamps' mirror images, behind a body, and past all of it.
+    for (i, of) in LAMPS[..4].iter().enumerate() {
+        let beside = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.5\nx_mm = [55, 90]\n\
+                      y_mm = [-9, 9]\n";
+        let body = if i < 3 { format!("[[occluder]]\n{}", BODIES[i]) } else { beside.to_owned() };
+        let text = format!("{GLOSSY}{}{body}", lamp(*of));
+        let both = Both::new(read(&text), &[], exact_rig());
+        let row = both.compiled.effects().iter().find(|row| row.name == "gloss[0]").unwrap();
+        assert!(row.included && row.error.unwrap() < 1e-5, "{row:?}");
+        let poses = [(0.0, 0.0, 0.0, 0.0), (3.0, -4.0, 50.0, 210.0), (5.0, 3.0, 40.0, 180.0)];
+        let axes = poses.map(|(x, y, theta, phi)| axis(x, y, theta, phi));
+        let found = axes.map(|at| both.along(&at, PATHS / 2));
+        let brightest = found.iter().map(|(found, _)| *found).fold(0.0, f64::max);
+        assert!(brightest > 0.0, "{}: dark", of.0);
+        for (at, along) in axes.iter().zip(found) {
+            agree(&format!("{} {at:?}", of.0), along, brightest, 1e-6, 8e-3);
+            let seen = both.seen(at, RAYS);
+            agree(&format!("beam, {} {at:?}", of.0), seen, brightest, both.stated(), 8e-3);
+        }
+    }
+}
+
 const FLOOR: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-12, 50]\n\
                      y_mm = [-40, 40]\n";
 

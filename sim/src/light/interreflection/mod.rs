@@ -21,7 +21,7 @@ use radiometry::shape::Polygon;
 use super::lamps::{Lighting, position, region_of, shining};
 use super::occluder_of;
 use crate::CompileError;
-use crate::scene::{Body, Scene, Surface};
+use crate::scene::{Body, Scene};
 use gather::{Between, gather};
 use mesh::{Mesh, NODES, OnNodes, SIDE, roughness};
 
@@ -77,21 +77,6 @@ pub(super) struct Interreflection {
     indirect: Vec<OnNodes>,
 }
 
-/// The pairs of surfaces of which each lies before the other, and both reflect.
-pub(super) fn facing(scene: &Scene) -> Vec<(usize, usize)> {
-    let reflects = |surface: &Surface| surface.reflection().reflectance_bound() > 0.0;
-    let surfaces = scene.surfaces();
-    let mut pairs = Vec::new();
-    for (i, surface) in surfaces.iter().enumerate() {
-        for (k, other) in surfaces.iter().enumerate().skip(i + 1) {
-            if reflects(surface) && reflects(other) && surface.body().faces(other.body()) {
-                pairs.push((i, k));
-            }
-        }
-    }
-    pairs
-}
-
 /// Between cells that are known already.
 #[derive(Default)]
 struct Known {
@@ -108,7 +93,7 @@ impl Exchange {
         lightings: &[Arc<Lighting>],
         aim: Aim,
     ) -> Result<Option<Self>, CompileError> {
-        let pairs = facing(scene);
+        let pairs = scene.facing();
         let takes_part = |i: &usize| pairs.iter().any(|(a, b)| a == i || b == i);
         let members: Vec<usize> = (0..scene.surfaces().len()).filter(takes_part).collect();
         if members.is_empty() {

@@ -71,6 +71,17 @@ impl Scene {
         for table in windows {
             window::read(table, &mut scene)?;
         }
+        if let Some((i, what)) = scene.unsupported_gloss() {
+            let surfaces = document.root().tables("surface")?;
+            let (root, own) = (document.root(), surfaces.get(i));
+            return Err(own.unwrap_or(&root).problem(
+                "kind",
+                &format!("not simulated: {what}"),
+                "a glossy surface that sees no other surface, no environment and no window of the \
+                 sample above it",
+                "make it lambertian, or leave the other out",
+            ));
+        }
         Ok(scene)
     }
 }

@@ -29,10 +29,11 @@ const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-
 pub(super) type Draw = fn(&mut Dice) -> Case;
 
 /// Shadows are tried twice: of a disk and of a ball.
-pub(super) const EFFECTS: [Draw; 9] = [
+pub(super) const EFFECTS: [Draw; 10] = [
     weak_lamp,
     shadow,
     shadow,
+    gloss,
     window,
     lamp_in_beam,
     beam_shadow,
@@ -91,6 +92,27 @@ fn shadow(dice: &mut Dice) -> Case {
         likely.push([foot.x, foot.y, 0.0, 0.0]);
     }
     Case { likely, ..case("shadow[0]", scene) }
+}
+
+/// From a gleam to a mirror, of a lamp whose image is seen from the region.
+fn gloss(dice: &mut Dice) -> Case {
+    let (gloss, exponent) = (dice.decades(-8.0, -0.35), dice.decades(-1.0, 3.0));
+    let (x, y) = (dice.uniform(-150.0, 150.0), dice.uniform(-150.0, 150.0));
+    let (z, r) = (dice.uniform(350.0, 600.0), dice.uniform(5.0, 40.0));
+    let scene = format!(
+        "[[surface]]\nkind = \"glossy\"\nalbedo = 0.5\ngloss = {gloss}\nexponent = {exponent}\n\
+         x_mm = [-50, 50]\ny_mm = [-50, 50]\n\
+         [[lamp]]\nkind = \"sphere\"\ncentre_mm = [{x}, {y}, {z}]\nradius_mm = {r}\n\
+         radiance_w_per_m2_sr = 100\n"
+    );
+    let corners =
+        [-HALF_MM, 0.0, HALF_MM].into_iter().flat_map(|x| [-HALF_MM, HALF_MM].map(|y| [x, y]));
+    let image = |[at_x, at_y]: [f64; 2]| {
+        let away = DVec3::new(x - at_x, y - at_y, z);
+        let theta = (away.truncate().length() / z).atan();
+        [at_x, at_y, theta, (-away.y).atan2(-away.x)]
+    };
+    Case { likely: corners.map(image).collect(), ..case("gloss[0]", scene) }
 }
 
 fn window(dice: &mut Dice) -> Case {
