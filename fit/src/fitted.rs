@@ -5,7 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
-use crate::{BasisSpec, BeamRows, FitError, Penalised, Penalty, Ray, Region};
+use crate::{BasisSpec, BeamRows, FitError, Influence, Penalised, Penalty, Ray, Region};
 use radiometry::DomainError;
 use std::f64::consts::FRAC_PI_2;
 
@@ -88,6 +88,7 @@ pub struct Quality {
 pub struct Fit {
     basis: Basis,
     parts: Parts,
+    influence: Option<Influence>,
 }
 
 impl Fit {
@@ -105,7 +106,16 @@ impl Fit {
         for common in &parts.shifts {
             demand("shift", p, &common.shift)?;
         }
-        Ok(Self { basis, parts })
+        Ok(Self { basis, parts, influence: None })
+    }
+
+    pub(crate) fn with_influence(self, influence: Influence) -> Self {
+        Self { influence: Some(influence), ..self }
+    }
+
+    /// What each sample did to the exitance; `None` of a fit that was stored and taken up again.
+    pub fn influence(&self) -> Option<&Influence> {
+        self.influence.as_ref()
     }
 
     /// The numbers that the fit consists of.
@@ -298,10 +308,15 @@ impl Fit {
 
     pub(crate) fn budget(&self, functional: &[f64]) -> Vec<Contribution> {
         let independent = self.independent_variance(functional).sqrt();
-        let first = Contribution { name: INDEPENDENT.to_owned(), u: independent };
-        let common = self.common_shifts(functional);
-        let common = common.map(|(name, shift)| Contribution { name: name.into(), u: shift.abs() });
-        std::iter::once(first).chain(common).collect()
+        let mut budget = vec![Contribution { name: INDEPENDENT.to_owned(), u: independent }];
+        for (name, shift) in self.common_shifts(functional) {
+            let source = name.split_once(" @ ").map_or(name, |(source, _)| source);
+            match budget.iter_mut().skip(1).find(|row| row.name == source) {
+                Some(row) => row.u = libm::hypot(row.u, shift),
+                None => budget.push(Contribution { name: source.to_owned(), u: shift.abs() }),
+            }
+        }
+        budget
     }
 
     fn independent_variance(&self, functional: &[f64]) -> f64 {

@@ -7,7 +7,8 @@ use std::fmt;
 
 /// A source of uncertainty that all samples share. Components are independent of each other.
 pub struct Common {
-    /// What it is, as a budget's row names it.
+    /// What it is, as a budget's row names it. Of a name such as `theta readback @ 16°` the row has
+    /// what stands before the @: components that differ by a place alone share a row.
     pub name: String,
     /// Its standard uncertainty: relative for [`Shift::Scale`], in the value's unit for
     /// [`Shift::Offset`]. For the others it informs only: they are handed a shift by one u.
@@ -24,9 +25,20 @@ pub enum Shift {
     Offset,
     /// The ray that was really seen, from the sample's index and the ray it is taken for.
     Ray(RayShift),
+    /// As [`Shift::Ray`], but each sample is off by a draw of its own: what an encoder is off by at a
+    /// position where no other sample was taken. It shifts nothing in common; it adds to the variance of
+    /// each sample, by how much the fitted field changes from one ray to the other.
+    Jitter(RayShift),
     /// By how much the value is too large, from the sample's index and its fitted level. For what
     /// holds for some samples alone, such as one gain range's factor.
     Value(ValueShift),
+}
+
+impl Shift {
+    /// Whether samples share it, so that it does not average away.
+    pub(crate) fn is_shared(&self) -> bool {
+        !matches!(self, Self::Jitter(_))
+    }
 }
 
 /// From a sample's index and the ray that it is taken for to the ray that was really seen.
@@ -46,6 +58,7 @@ impl fmt::Debug for Shift {
             Self::Scale => "Scale",
             Self::Offset => "Offset",
             Self::Ray(_) => "Ray(..)",
+            Self::Jitter(_) => "Jitter(..)",
             Self::Value(_) => "Value(..)",
         })
     }

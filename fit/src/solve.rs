@@ -13,7 +13,7 @@ use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{Common, FitError, Noise, Ray, Region, Sample, Shift, undetermined};
+use crate::{Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, undetermined};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -90,18 +90,22 @@ pub fn fit_flown(
         return Err(refusal);
     }
     let design = Design::new(samples, &basis, optics)?.in_flight(flown);
-    let settled = settle(&design, &prior)?;
+    let (common, jitters): (Vec<&Common>, Vec<&Common>) =
+        common.iter().partition(|common| common.shift.is_shared());
+    let settled = settle(&design, &prior, &jitters)?;
     let needs_a_side = |common: &Common| needs_a_side(common, &design);
-    let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c)).collect();
+    let shifting: Vec<&Common> = common.iter().copied().filter(|c| needs_a_side(c)).collect();
     let sides = sensitivities(&design, &settled, &shifting)?;
     let solution = solve(&design, &settled.variances, &sides, &prior)?;
     let coefficients = solution.unknowns(0);
-    let shifts = shifts(common, &coefficients, &design, &solution);
+    let shifts = shifts(&common, &coefficients, &design, &solution);
     let levels = levels(&design, &coefficients);
     let factor = solution.inverse();
     let determined = prior.determined_by(&solution);
     let quality = quality(&design, &levels, (&solution, determined), &settled)?;
+    let influence = Influence::of(&design, &settled, &factor);
     Fit::from_parts(Parts { region: *region, model, coefficients, factor, shifts, quality })
+        .map(|fit| fit.with_influence(influence))
         .map_err(|_| FitError::OutOfRange)
 }
 
@@ -123,8 +127,10 @@ pub(crate) fn weighted(
         return Err(refusal);
     }
     let design = Design::new(samples, &basis, optics)?;
-    let settled = settle(&design, &prior)?;
-    let sides = sensitivities(&design, &settled, &common.iter().collect::<Vec<_>>())?;
+    let (common, jitters): (Vec<&Common>, Vec<&Common>) =
+        common.iter().partition(|common| common.shift.is_shared());
+    let settled = settle(&design, &prior, &jitters)?;
+    let sides = sensitivities(&design, &settled, &common)?;
     let triangle = triangle(&design, &settled.variances, &sides)?;
     Ok((triangle, settled.variances))
 }
@@ -181,7 +187,7 @@ fn triangle(
 /// only that an offset of beams that are cut is no constant field.
 fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
     match common.shift {
-        Shift::Scale => false,
+        Shift::Scale | Shift::Jitter(_) => false,
         Shift::Offset => !design.holds_constant(),
         Shift::Ray(_) | Shift::Value(_) => true,
     }
@@ -200,7 +206,7 @@ fn sensitivities(
         Shift::Scale => common.u * levels[i],
         Shift::Offset => common.u,
         Shift::Value(excess) => excess(i, levels[i]),
-        Shift::Ray(seen) => {
+        Shift::Ray(seen) | Shift::Jitter(seen) => {
             let seen = seen(i, &samples[i].ray);
             design.change(i, &seen, coefficients, &mut room)
         }
@@ -218,7 +224,7 @@ fn sensitivities(
 
 /// The coefficients' shift by one u of each component, in the order handed in.
 fn shifts(
-    common: &[Common],
+    common: &[&Common],
     coefficients: &[f64],
     design: &Design<'_>,
     solution: &Solution,
@@ -229,7 +235,7 @@ fn shifts(
         Shift::Offset if design.holds_constant() => {
             design.basis().unity().iter().map(|value| c.u * value).collect()
         }
-        Shift::Offset | Shift::Ray(_) | Shift::Value(_) => {
+        Shift::Offset | Shift::Ray(_) | Shift::Jitter(_) | Shift::Value(_) => {
             side += 1;
             solution.unknowns(side)
         }
@@ -248,11 +254,11 @@ fn quality(
     let model = Model::of(samples);
     let n = samples.len() as f64;
     let (mut squares, mut chi2) = (0.0, 0.0);
-    for (sample, level) in samples.iter().zip(levels) {
+    for ((sample, level), moved) in samples.iter().zip(levels).zip(&settled.moved) {
         let square = (sample.value - level).powi(2);
         let unstated = if sample.noise == Noise::Unknown { excess } else { 0.0 };
         squares += square;
-        chi2 += square / (model.variance(sample.noise, *level) + unstated);
+        chi2 += square / (model.variance(sample.noise, *level) + moved + unstated);
     }
     Ok(Quality {
         condition: spectrum.condition(),

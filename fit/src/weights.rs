@@ -11,7 +11,7 @@
 use crate::beam::design::Design;
 use crate::penalty::Prior;
 use crate::solve::{levels, solve};
-use crate::{FitError, Noise, Sample, undetermined};
+use crate::{Common, FitError, Noise, Sample, Shift, undetermined};
 
 /// Weights that agree with the fit that they lead to.
 pub(crate) struct Settled {
@@ -21,12 +21,19 @@ pub(crate) struct Settled {
     pub(crate) levels: Vec<f64>,
     /// What the samples are weighted by.
     pub(crate) variances: Vec<f64>,
+    /// The part of each variance that comes from rays off the ones that were meant.
+    pub(crate) moved: Vec<f64>,
     /// The part of every variance that the stated noise doesn't hold.
     pub(crate) excess: f64,
 }
 
-/// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes.
-pub(crate) fn settle(design: &Design<'_>, prior: &Prior) -> Result<Settled, FitError> {
+/// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes. `jitters` are what each
+/// sample's ray is off by on its own.
+pub(crate) fn settle(
+    design: &Design<'_>,
+    prior: &Prior,
+    jitters: &[&Common],
+) -> Result<Settled, FitError> {
     let (samples, basis) = (design.samples(), design.basis());
     let model = Model::of(samples);
     let mut settled = start(samples, model);
@@ -42,8 +49,13 @@ pub(crate) fn settle(design: &Design<'_>, prior: &Prior) -> Result<Settled, FitE
         settled.levels = levels(design, &settled.coefficients);
         let determined = prior.determined_by(&solution);
         let dof = (samples.len() as f64 - determined).max(0.0);
-        settled.excess = excess(samples, &settled.levels, model, dof);
-        let next = model.variances(samples, &settled.levels, settled.excess);
+        // The field of the second pass is near enough to the last one's: this is of second order.
+        if pass < 2 {
+            settled.moved = moved(design, &settled.coefficients, jitters)?;
+        }
+        let stated = model.variances(samples, &settled);
+        settled.excess = excess(samples, &settled.levels, &stated, dof);
+        let next: Vec<f64> = stated.iter().map(|variance| variance + settled.excess).collect();
         let change = next.iter().zip(&settled.variances).map(|(a, b)| (a / b - 1.0).abs());
         let is_settled = change.fold(0.0, f64::max) < SETTLED_RELATIVE;
         settled.variances = next;
@@ -59,8 +71,34 @@ fn start(samples: &[Sample], model: Model) -> Settled {
     let mean = samples.iter().map(|s| s.value / samples.len() as f64).sum::<f64>();
     let levels = vec![mean; samples.len()];
     let excess = if has_unknown(samples) { model.mean_square } else { 0.0 };
-    let variances = model.variances(samples, &levels, excess);
-    Settled { coefficients: Vec::new(), levels, variances, excess }
+    let moved = vec![0.0; samples.len()];
+    let mut start =
+        Settled { coefficients: Vec::new(), levels, variances: Vec::new(), moved, excess };
+    let stated = model.variances(samples, &start);
+    start.variances = stated.into_iter().map(|variance| variance + excess).collect();
+    start
+}
+
+/// The variance of each sample by rays that are off each on its own.
+fn moved(
+    design: &Design<'_>,
+    coefficients: &[f64],
+    jitters: &[&Common],
+) -> Result<Vec<f64>, FitError> {
+    let samples = design.samples();
+    let mut variances = vec![0.0; samples.len()];
+    let mut room = design.room();
+    for common in jitters {
+        let Shift::Jitter(seen) = &common.shift else { continue };
+        for (i, (sample, variance)) in samples.iter().zip(&mut variances).enumerate() {
+            let seen = seen(i, &sample.ray);
+            *variance += design.change(i, &seen, coefficients, &mut room).powi(2);
+        }
+        if !variances.iter().all(|variance| variance.is_finite()) {
+            return Err(FitError::Common { name: common.name.clone() });
+        }
+    }
+    Ok(variances)
 }
 
 /// Whether the noise of any sample is left to the residuals.
@@ -101,19 +139,22 @@ impl Model {
         }
     }
 
-    fn variances(self, samples: &[Sample], levels: &[f64], excess: f64) -> Vec<f64> {
-        samples.iter().zip(levels).map(|(s, l)| self.variance(s.noise, *l) + excess).collect()
+    /// What is stated of each sample: its noise at its level, and how well its ray is known.
+    fn variances(self, samples: &[Sample], settled: &Settled) -> Vec<f64> {
+        let parts = samples.iter().zip(&settled.levels).zip(&settled.moved);
+        parts.map(|((s, level), moved)| self.variance(s.noise, *level) + moved).collect()
     }
 }
 
 /// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof (samples less
 /// what they determine: what a penalty smooths away is in the posterior, not counted here twice); 0 where the
 /// stated noise explains the residuals.
-fn excess(samples: &[Sample], levels: &[f64], model: Model, dof: f64) -> f64 {
+fn excess(samples: &[Sample], levels: &[f64], stated: &[f64], dof: f64) -> f64 {
     let terms: Vec<(f64, f64)> = samples
         .iter()
         .zip(levels)
-        .map(|(s, l)| ((s.value - l).powi(2), model.variance(s.noise, *l)))
+        .zip(stated)
+        .map(|((s, l), variance)| ((s.value - l).powi(2), *variance))
         .collect();
     let sum = |tau2: f64, power: i32| -> f64 {
         terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()

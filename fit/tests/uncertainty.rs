@@ -149,6 +149,75 @@ fn u_grows_where_nothing_was_measured() {
     assert!(at(1.5) > 5.0 * at(0.5));
 }
 
+#[test]
+fn rays_that_are_off_each_on_its_own_are_in_every_u() {
+    // An encoder of 0.3°, next to which the noise is nothing: where the lobe is steep, readings
+    // scatter by it, on the normal and at the rim they don't.
+    let rays = spread_rays(300, &REGION, 11);
+    let off = 0.005;
+    let mut squares = 0.0;
+    for seed in 0..SEEDS {
+        let mut die = Die::new(4000 + seed);
+        let seen = |ray: &Ray, die: &mut Die| {
+            let theta_rad = (ray.theta_rad + off * die.normal()).clamp(0.0, PI / 2.0);
+            Ray { theta_rad, ..*ray }
+        };
+        let noise = Noise::Fixed { variance: 1e-4 };
+        let sample = |ray: &Ray| {
+            let value = lobe(&seen(ray, &mut die)) + 0.01 * die.normal();
+            Sample { ray: *ray, value, noise }
+        };
+        let samples: Vec<Sample> = rays.iter().map(sample).collect();
+        let moved = move |_: usize, ray: &Ray| Ray { theta_rad: ray.theta_rad - off, ..*ray };
+        let encoder =
+            Common { name: "encoder".into(), u: off, shift: Shift::Jitter(Box::new(moved)) };
+        let field = with_common(&samples, encoder);
+        assert!(field.parts().shifts.is_empty(), "it shifts nothing in common");
+        let chi2 = field.chi2() / field.dof() as f64;
+        assert!((0.6..1.5).contains(&chi2), "chi2 a degree of freedom: {chi2}");
+        squares += ((field.exitance().value - LOBE_EXITANCE) / field.exitance().u).powi(2);
+    }
+    let rms = (squares / SEEDS as f64).sqrt();
+    assert!((0.9..=1.1).contains(&rms), "rms of z: {rms}");
+}
+
+#[test]
+fn the_influences_of_the_samples_make_up_the_independent_variance() {
+    let rays = spread_rays(300, &REGION, 13);
+    let samples = noisy(&rays, 1e-3, 1e-2, &mut Die::new(5));
+    let field = fit::fit(&samples, &REGION, BASIS, &[]).unwrap();
+    let influence = field.influence().unwrap();
+    assert!(influence.excess.abs() < f64::MIN_POSITIVE);
+    let variance: f64 = influence
+        .exitance
+        .iter()
+        .zip(&samples)
+        .map(|(g, s)| g * g * (1e-3 + 1e-2 * field.value(&s.ray).max(0.0)))
+        .sum();
+    let u = field.exitance().u_independent;
+    assert!((variance.sqrt() / u - 1.0).abs() < 1e-2, "{} {u}", variance.sqrt());
+    // And they are what a sample's value does.
+    let expected = brute_force(&samples, |i, _| f64::from(u8::from(i == 7)));
+    let of_value = expected[0] * PI.sqrt();
+    assert!((influence.exitance[7] / of_value - 1.0).abs() < 0.05, "{of_value}");
+}
+
+#[test]
+fn components_that_differ_by_a_place_alone_share_a_row_of_the_budget() {
+    let samples = exact(&spread_rays(300, &REGION, 12), lobe);
+    let of_place = |place: usize, excess: f64| Common {
+        name: format!("readback @ {place}"),
+        u: 1.0,
+        shift: Shift::Value(Box::new(move |i, _| if i % 2 == place { excess } else { 0.0 })),
+    };
+    let alone = |place, excess| with_common(&samples, of_place(place, excess)).contributions()[1].u;
+    let both = fit::fit(&samples, &REGION, BASIS, &[of_place(0, 0.3), of_place(1, 0.4)]).unwrap();
+    let budget = both.contributions();
+    assert_eq!(budget.len(), 2);
+    assert_eq!(budget[1].name, "readback");
+    assert!((budget[1].u - alone(0, 0.3).hypot(alone(1, 0.4))).abs() < 1e-12);
+}
+
 fn brute_force(samples: &[Sample], change: impl Fn(usize, &Sample) -> f64) -> Vec<f64> {
     let fitted = |samples: &[Sample]| fit::fit(samples, &REGION, BASIS, &[]).unwrap();
     let shifted = |(i, s): (usize, &Sample)| Sample { value: s.value + change(i, s), ..*s };

@@ -129,6 +129,7 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
         n_excluded: fitted.n_excluded,
         notes: &[],
         truth: results.truth,
+        independent: &results.independent,
         derived: &results.derived,
     };
     show(args, rays, &file, Some(&path))
@@ -167,6 +168,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
         n_excluded: input.samples.len() - samples.len(),
         notes: &notes,
         truth: None,
+        independent: &[],
         derived: &derived,
     };
     if let Some(path) = &args.output {

@@ -210,6 +210,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wan
         n_excluded: usize::try_from(n_excluded).unwrap_or(usize::MAX),
         notes: &notes,
         truth: None,
+        independent: &[],
         derived: &derived,
     };
     if let Some(path) = &args.output {

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{Fit, FitError, Optics, Region, Wish};
+use fit::{Contribution, Fit, FitError, Optics, Region, Wish};
 
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
@@ -38,6 +38,8 @@ pub(crate) struct Results {
     pub(crate) accuracy: Vec<AccuracyPoint>,
     /// What the fit gives each sample's reading, in the samples' order; empty without a fit.
     pub(crate) levels: Vec<f64>,
+    /// The independent part of the exitance's u by source.
+    pub(crate) independent: Vec<Contribution>,
     /// What the plan asks to be derived from the fit.
     pub(crate) derived: Vec<DerivedQuantity>,
 }
@@ -64,7 +66,11 @@ impl Results {
             |_| Vec::new(),
             |fitted| derive(&fitted.fit, setup.rig.detector.quantity, &setup.plan.derive),
         );
-        Ok(Self { calibrated, fitted, truth, score: score.flatten(), accuracy, levels, derived })
+        let independent = fitted
+            .as_ref()
+            .map_or_else(|_| Vec::new(), |fitted| calibrated.independent_budget(&fitted.fit));
+        let score = score.flatten();
+        Ok(Self { calibrated, fitted, truth, score, accuracy, levels, independent, derived })
     }
 
     /// Samples that carry a flag.
@@ -147,6 +153,7 @@ impl Results {
             n_excluded: fitted.n_excluded,
             notes: &[],
             truth: self.truth,
+            independent: &self.independent,
             derived: &self.derived,
         };
         write_atomically(path, |out| file.write(out))

@@ -3,7 +3,8 @@
 use std::io::{self, Write};
 
 use fit::{
-    Angular, BasisSpec, BeamRows, Choice, Estimate, Fit, Limit, Penalty, Position, Resolves, Width,
+    Angular, BasisSpec, BeamRows, Choice, Contribution, Estimate, Fit, Limit, Penalty, Position,
+    Resolves, Width,
 };
 use serde_json::{Map, Value, json};
 
@@ -31,6 +32,8 @@ pub struct FitFile<'a> {
     pub notes: &'a [String],
     /// What is true, on a simulated rig.
     pub truth: Option<Truth>,
+    /// The independent part of the exitance's u by source; empty where that is not known.
+    pub independent: &'a [Contribution],
     /// What was derived from the fit beyond what is always there.
     pub derived: &'a [DerivedQuantity],
 }
@@ -112,7 +115,8 @@ impl FitFile<'_> {
         put("n_flagged", json!(self.n_flagged));
         put("n_excluded", json!(self.n_excluded));
         put("notes", json!(self.notes));
-        put("uncertainty_budget_exitance", self.budget());
+        put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
+        put("uncertainty_budget_exitance_independent", budget(self.independent));
         self.put_derived(&mut object);
         let derived = self.derived.iter().map(|quantity| quantity.json(self.quantity));
         object.insert("derived".to_owned(), derived.collect());
@@ -143,11 +147,6 @@ impl FitFile<'_> {
         object.insert(quantity.peak_key().to_owned(), at);
     }
 
-    fn budget(&self) -> Value {
-        let rows = self.fit.contributions();
-        rows.iter().map(|row| json!({"name": row.name, "u": row.u})).collect()
-    }
-
     fn truth(&self, truth: Truth) -> Value {
         let quantity = self.quantity;
         let is_bright = truth.exitance > 0.0;
@@ -165,6 +164,10 @@ impl FitFile<'_> {
             "radiance_error_rms_relative": truth.radiance_error_rms_relative,
         })
     }
+}
+
+fn budget(rows: &[Contribution]) -> Value {
+    rows.iter().map(|row| json!({"name": row.name, "u": row.u})).collect()
 }
 
 /// Which functions. What a kind does not have is null.
@@ -323,6 +326,7 @@ mod tests {
             n_excluded: 1,
             notes: &notes,
             truth: Some(truth),
+            independent: &[],
             derived: &[],
         };
         let json = written(&file);
@@ -369,6 +373,7 @@ mod tests {
                 n_excluded: 0,
                 notes: &[],
                 truth: None,
+                independent: &[],
                 derived: &[],
             };
             let json = written(&file);

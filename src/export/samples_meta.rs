@@ -112,6 +112,10 @@ impl SamplesMeta<'_> {
                 let (factor, unit) = file_unit(axis);
                 json!({"name": name, "u": u * factor, "unit": unit, "session": session})
             }
+            Effect::Readback { axis } => {
+                let (factor, unit) = file_unit(axis);
+                json!({"name": name, "u": u * factor, "unit": unit, "shared_by": "position"})
+            }
         };
         self.calibrated.components.iter().map(one).collect()
     }

@@ -25,7 +25,7 @@ fn sample(value: f64, u: f64, pose: Pose) -> Sample {
         u_independent: 0.25,
         u_common: 0.125,
         u,
-        noise: ModelledVariance { floor: 1.0, per_radiance: 0.0 },
+        noise: ModelledVariance { floor: 1.0, per_radiance: 0.0, read: 1.0, quantisation: 0.0 },
         u_scale_relative: 0.0,
         u_dark: 0.0,
         flags: Flags::default(),

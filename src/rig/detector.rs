@@ -86,6 +86,10 @@ pub struct ModelledVariance {
     pub floor: f64,
     /// More for each unit of radiance: its shot noise.
     pub per_radiance: f64,
+    /// Of the floor: read noise.
+    pub read: f64,
+    /// Of the floor: quantisation.
+    pub quantisation: f64,
 }
 
 impl Quantity {
@@ -231,9 +235,12 @@ impl Detector {
         let read_a2 = self.read_noise_a * self.read_noise_a / n;
         let floor_a2 = read_a2 + quantisation_a2 + shot_a2_per_a * dark_a.max(0.0);
         let a_per_radiance = self.a_per_radiance();
+        let a2_per_square = a_per_radiance * a_per_radiance;
         ModelledVariance {
-            floor: floor_a2 / (a_per_radiance * a_per_radiance),
+            floor: floor_a2 / a2_per_square,
             per_radiance: shot_a2_per_a / a_per_radiance,
+            read: read_a2 / a2_per_square,
+            quantisation: quantisation_a2 / a2_per_square,
         }
     }
 

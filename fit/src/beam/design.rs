@@ -201,6 +201,9 @@ impl<'s> Design<'s> {
         room: &mut Room,
     ) -> f64 {
         let ray = &self.samples[i].ray;
+        if seen == ray {
+            return 0.0;
+        }
         let Some(Averaged { averager, .. }) =
             self.beam.as_ref().filter(|beam| matches!(beam.kinds[i], Kind::Across(_) | Kind::Off))
         else {

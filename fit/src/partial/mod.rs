@@ -226,11 +226,12 @@ impl Partial {
         for (sample, variance) in samples.iter().zip(&variances) {
             sums.note(sample.value, *variance);
         }
+        let shared = common.iter().filter(|common| common.shift.is_shared());
         Ok(Self {
             basis: Basis::new(model.basis, *region)?,
             penalty: model.penalty,
             weighting: Weighting::Stated,
-            common: common.iter().map(|common| common.name.clone()).collect(),
+            common: shared.map(|common| common.name.clone()).collect(),
             sums,
             triangle,
         })

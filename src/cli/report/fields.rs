@@ -1,6 +1,6 @@
 //! The fitted field as pictures: polar diagram, hemisphere, the sample's plane, the budget.
 
-use fit::{Fit, Ray};
+use fit::{Contribution, Fit, Ray};
 
 use super::quantities::{scale_u_relative, without_scale};
 use super::words::Words;
@@ -108,11 +108,19 @@ fn plane(fit: &Fit, words: &Words, used: &[&Sample]) -> Option<Picture> {
     })
 }
 
-/// The uncertainty's sources.
-pub(super) fn budget(setup: &Setup, fitted: &Fitted) -> Option<Section> {
+/// The uncertainty's sources, the independent part by its own.
+pub(super) fn budget(
+    setup: &Setup,
+    fitted: &Fitted,
+    independent: &[Contribution],
+) -> Option<Section> {
     let words = Words::of(setup.rig.detector.quantity);
-    let parts: Vec<(String, f64)> =
-        fitted.fit.contributions().into_iter().map(|part| (part.name, part.u)).collect();
+    let mut rows = fitted.fit.contributions();
+    if !independent.is_empty() {
+        // The first row is the independent part as a whole.
+        rows.splice(..1, independent.iter().cloned());
+    }
+    let parts: Vec<(String, f64)> = rows.into_iter().map(|part| (part.name, part.u)).collect();
     let value = fitted.fit.exitance().value;
     let picture = Budget { quantity: words.exitance, value, parts: &parts }.picture()?;
     let title = "Where the uncertainty comes from".to_owned();

@@ -97,7 +97,7 @@ pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Re
             });
             sections.extend(derived::section(setup, results));
             sections.push(fields::section(setup, results, fitted));
-            sections.extend(fields::budget(setup, fitted));
+            sections.extend(fields::budget(setup, fitted, &results.independent));
             sections.extend(course::accuracy(setup, results));
             sections.extend(course::residuals(setup, results, length_s));
         }

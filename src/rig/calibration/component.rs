@@ -36,12 +36,19 @@ pub enum Effect {
         /// In this session alone; `None` in all.
         session: Option<u32>,
     },
+    /// The axis stands u further on than its readback says, by a draw of its own at each position:
+    /// samples of one position share it, others do not.
+    Readback {
+        /// Which axis.
+        axis: AxisName,
+    },
 }
 
 impl Component {
     /// Whether it concerns the sample.
     pub fn concerns(&self, sample: &Sample) -> bool {
         match self.effect {
+            Effect::Readback { .. } => true,
             Effect::Scale { gain } => gain.is_none_or(|gain| gain == sample.gain),
             Effect::Offset { gain } => gain == sample.gain,
             Effect::Axis { session, .. } => session.is_none_or(|session| session == sample.session),
@@ -58,13 +65,13 @@ impl Component {
         }
     }
 
-    /// The ray that was really seen if the component is off by one u.
-    pub fn ray_seen(&self, sample: &Sample) -> Pose {
+    /// The ray that was really seen if the component is off by so many u.
+    pub fn ray_seen(&self, sample: &Sample, times: f64) -> Pose {
         match self.effect {
-            Effect::Axis { axis, .. } if self.concerns(sample) => {
+            Effect::Axis { axis, .. } | Effect::Readback { axis } if self.concerns(sample) => {
                 let AxisPositions(mut positions) = sample.positions;
                 for (position, name) in positions.iter_mut().zip(AXES) {
-                    *position += if name == axis { self.u } else { 0.0 };
+                    *position += if name == axis { times * self.u } else { 0.0 };
                 }
                 forward(AxisPositions(positions))
             }
@@ -99,6 +106,8 @@ pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component
             let homing = Effect::Axis { axis: axis.name, session: Some(session) };
             all.push(component(&format!("{name} homing {session}"), axis.u_homing, homing));
         }
+        let readback = Effect::Readback { axis: axis.name };
+        all.push(component(&format!("{name} readback"), axis.u_readback, readback));
     }
     all.retain(|component| component.u > 0.0);
     all

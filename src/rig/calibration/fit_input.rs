@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fit::{Common, Noise, Ray, Shift};
 
-use super::{Calibrated, Component, Effect, Sample};
+use super::{Calibrated, Component, Effect, Sample, readback};
 use crate::rig::Pose;
 
 /// What goes into a fit of a run's samples.
@@ -42,7 +42,10 @@ impl Calibrated {
             .components
             .iter()
             .filter(|component| used.iter().any(|sample| component.concerns(sample)))
-            .map(|component| common(component, &used))
+            .flat_map(|component| match component.effect {
+                Effect::Readback { axis } => readback::components(component, axis, &used),
+                _ => vec![common(component, &used)],
+            })
             .collect();
         FitInput { samples, common, places }
     }
@@ -57,12 +60,14 @@ fn common(component: &Component, used: &Arc<[Sample]>) -> Common {
         Effect::Scale { .. } | Effect::Offset { .. } => {
             Shift::Value(Box::new(move |i, level| own.excess(&samples[i], level)))
         }
-        Effect::Axis { .. } => Shift::Ray(Box::new(move |i, _| ray(own.ray_seen(&samples[i])))),
+        Effect::Axis { .. } | Effect::Readback { .. } => {
+            Shift::Ray(Box::new(move |i, _| ray(own.ray_seen(&samples[i], 1.0))))
+        }
     };
     Common { name: component.name.clone(), u: component.u, shift }
 }
 
-fn ray(pose: Pose) -> Ray {
+pub(super) fn ray(pose: Pose) -> Ray {
     let Pose { x_m, y_m, theta_rad, phi_rad } = pose;
     Ray { x_m, y_m, theta_rad, phi_rad }
 }

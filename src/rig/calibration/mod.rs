@@ -13,10 +13,12 @@
 //! It depends on the set of readings, not on their order, so that a resumed run gives the same
 //! samples. It corrects for no drift; it reports and flags it.
 
+mod budget;
 mod component;
 mod dark;
 mod fit_input;
 mod fitting;
+mod readback;
 mod reference;
 mod sample;
 #[cfg(test)]

@@ -237,7 +237,8 @@ fn a_steady_drift_has_its_slope() {
 fn the_independent_part_is_the_models_at_the_stated_level() {
     let rig = rig();
     let mut calibrated = calibrate(&rig, &[dark(&rig, 0, DARK_A), target(&rig, 1, 9.0)]).unwrap();
-    let ModelledVariance { floor, per_radiance } = rig.detector.modelled_variance(0, 100, DARK_A);
+    let ModelledVariance { floor, per_radiance, .. } =
+        rig.detector.modelled_variance(0, 100, DARK_A);
     assert_close(calibrated.samples[0].u_independent, (floor + per_radiance * 9.0).sqrt());
     calibrated.restate(|_, _| 4.0);
     let sample = &calibrated.samples[0];
@@ -289,7 +290,7 @@ fn an_axis_zero_moves_the_ray_by_what_the_axis_does() {
     let sample = only_sample(&rig, reading);
     let by = |axis| {
         let effect = Effect::Axis { axis, session: None };
-        Component { name: String::new(), u: 0.01, effect }.ray_seen(&sample)
+        Component { name: String::new(), u: 0.01, effect }.ray_seen(&sample, 1.0)
     };
     // The arm stands beyond the zenith: further on is nearer to it.
     assert_close(by(AxisName::Theta).theta_rad, 10_f64.to_radians() - 0.01);
@@ -319,6 +320,76 @@ fn the_fit_gets_the_usable_samples_and_what_they_share() {
     let fit::Shift::Ray(seen) = by_name("x zero") else { panic!("an axis moves rays") };
     let sample = &input.samples[2];
     assert_close(seen(2, &sample.ray).x_m - sample.ray.x_m, rig.axes[2].u_zero);
+}
+
+#[test]
+fn what_a_readback_is_off_by_is_shared_by_the_samples_of_a_position() {
+    let rig = rig();
+    let at = |id: u32, theta: i32, phi: i32| {
+        let at = Latched([theta, phi, 0, 0]);
+        Reading { start: at, end: at, ..target(&rig, id, 0.5) }
+    };
+    // Two on one ring, one on another; three azimuths.
+    let readings =
+        [dark(&rig, 0, DARK_A), at(1, 10_000, 0), at(2, 10_000, 20_000), at(3, 30_000, 40_000)];
+    let calibrated = calibrate(&rig, &readings).unwrap();
+    let input = calibrated.fit_input();
+    let of = |start: &str| -> Vec<&fit::Common> {
+        input.common.iter().filter(|common| common.name.starts_with(start)).collect()
+    };
+    let change = |common: &fit::Common, i: usize| -> f64 {
+        let (fit::Shift::Ray(seen) | fit::Shift::Jitter(seen)) = &common.shift else {
+            panic!("a readback moves rays")
+        };
+        let ray = input.samples[i].ray;
+        libm::hypot(seen(i, &ray).theta_rad - ray.theta_rad, seen(i, &ray).phi_rad - ray.phi_rad)
+    };
+    let theta = of("theta readback");
+    let names: Vec<&str> = theta.iter().map(|common| common.name.as_str()).collect();
+    assert_eq!(names, ["theta readback", "theta readback @ 10.000°"]);
+    let u = rig.axes[0].u_readback;
+    for (common, moved) in theta.iter().zip([[0.0, 0.0, u], [u, u, 0.0]]) {
+        for (i, moved) in moved.into_iter().enumerate() {
+            assert!((change(common, i) - moved).abs() < 1e-12, "{} {i}", common.name);
+        }
+    }
+    assert!(matches!(theta[0].shift, fit::Shift::Jitter(_)));
+    // No two of one azimuth: nothing is shared.
+    assert_eq!(of("phi readback").len(), 1);
+}
+
+#[test]
+fn many_positions_share_components_that_have_their_squares() {
+    let rig = rig();
+    let mut readings = vec![dark(&rig, 0, DARK_A)];
+    for place in 0..100_u32 {
+        for twice in 0..2 {
+            let at = Latched([100 * i32::try_from(place).unwrap(), 0, 0, 0]);
+            let id = 1 + 2 * place + twice;
+            readings.push(Reading { start: at, end: at, ..target(&rig, id, 0.5) });
+        }
+    }
+    let input = calibrate(&rig, &readings).unwrap().fit_input();
+    let u = rig.axes[0].u_readback;
+    let theta = input.common.iter().filter(|c| c.name.starts_with("theta readback"));
+    let shifts: Vec<Vec<f64>> = theta
+        .map(|common| {
+            let fit::Shift::Ray(seen) = &common.shift else { panic!("all positions are shared") };
+            let moved = |(i, s): (usize, &fit::Sample)| {
+                let (from, to) = (s.ray, seen(i, &s.ray));
+                // The zenith is passed: sin keeps its sign by the azimuth.
+                (to.theta_rad - from.theta_rad) / u
+            };
+            input.samples.iter().enumerate().skip(2).map(moved).collect()
+        })
+        .collect();
+    assert_eq!(shifts.len(), 64);
+    let product = |i: usize, j: usize| shifts.iter().map(|s| s[i] * s[j]).sum::<f64>();
+    for i in (0..190).step_by(2) {
+        assert!((product(i, i) - 1.0).abs() < 1e-6, "{}", product(i, i));
+        assert!((product(i, i + 1) - 1.0).abs() < 1e-6, "one position is off as one");
+        assert!(product(i, i + 2).abs() < 0.6, "others are not: {}", product(i, i + 2));
+    }
 }
 
 proptest! {

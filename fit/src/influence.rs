@@ -1,0 +1,45 @@
+//! How much each sample weighs in the exitance, so that the independent part of its uncertainty can
+//! be told apart by what each sample's variance consists of. Knows no source of noise by name.
+
+use crate::basis::dot;
+use crate::beam::design::Design;
+use crate::weights::Settled;
+
+/// What each sample did to the exitance. Lives as long as the fit that made it; it is not stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Influence {
+    /// One a sample, in the order handed in: by how much the exitance grows with its value, sr. The
+    /// squares times the samples' variances add to the independent variance, less what a penalty
+    /// holds of it.
+    pub exitance: Vec<f64>,
+    /// One a sample: the part of its variance that comes from rays off the one that was meant
+    /// ([`crate::Shift::Jitter`]), in the values' unit squared.
+    pub moved: Vec<f64>,
+    /// The part of every sample's variance that nothing explains: see
+    /// [`crate::Quality::excess_rms`], squared.
+    pub excess: f64,
+}
+
+impl Influence {
+    /// `factor` is the packed S of the covariance S Sᵀ: the gradient of f·c is W A S Sᵀ f.
+    pub(crate) fn of(design: &Design<'_>, settled: &Settled, factor: &[f64]) -> Self {
+        let functional = design.basis().exitance();
+        let p = functional.len();
+        let column = |j: usize| &factor[j * (j + 1) / 2..][..=j];
+        let mut carried = vec![0.0; p];
+        for j in 0..p {
+            let product = dot(column(j), &functional[..=j]);
+            for (out, s) in carried.iter_mut().zip(column(j)) {
+                *out += product * s;
+            }
+        }
+        let mut room = design.room();
+        let exitance = settled
+            .variances
+            .iter()
+            .enumerate()
+            .map(|(i, variance)| design.level(i, &carried, &mut room) / variance)
+            .collect();
+        Self { exitance, moved: settled.moved.clone(), excess: settled.excess }
+    }
+}

@@ -1,0 +1,56 @@
+//! What is independent from sample to sample, by source: shot noise, read noise, quantisation,
+//! readbacks at positions of their own, scatter that nothing explains, and what a penalty smooths
+//! away. What samples share has rows of its own in every budget.
+
+use fit::{Contribution, Fit, Influence};
+
+use super::Calibrated;
+
+impl Calibrated {
+    /// The independent part of the exitance's u by source; the squares add to its square. The
+    /// samples are those that the fit was made of, restated from it. Empty for a fit that no longer
+    /// knows what its samples did.
+    pub fn independent_budget(&self, fit: &Fit) -> Vec<Contribution> {
+        let places = self.fit_input().places;
+        let Some(Influence { exitance, moved, excess }) = fit.influence() else {
+            return Vec::new();
+        };
+        if exitance.len() != places.len() {
+            return Vec::new();
+        }
+        let (mut shot, mut read, mut quantisation, mut readback, mut rest) =
+            (0.0, 0.0, 0.0, 0.0, 0.0);
+        for ((place, influence), moved) in places.into_iter().zip(exitance).zip(moved) {
+            let sample = &self.samples[place];
+            let square = influence * influence;
+            let noise = sample.noise;
+            read += square * noise.read;
+            quantisation += square * noise.quantisation;
+            shot += square
+                * (sample.u_independent * sample.u_independent - noise.read - noise.quantisation)
+                    .max(0.0);
+            readback += square * moved;
+            rest += square * excess;
+        }
+        let whole = fit.exitance().u_independent.powi(2);
+        let smoothing = whole - (shot + read + quantisation + readback + rest);
+        // The levels are those of the last pass, the variances those of the one before.
+        let smoothing = if smoothing > ROUNDING * whole { smoothing } else { 0.0 };
+        let rows = [
+            ("shot noise", shot),
+            ("read noise", read),
+            ("quantisation", quantisation),
+            ("readback of single positions", readback),
+            ("scatter beyond what is stated", rest),
+            ("smoothing", smoothing),
+        ];
+        rows.into_iter()
+            .filter(|(_, variance)| *variance > 0.0)
+            .map(|(name, variance)| Contribution { name: name.to_owned(), u: libm::sqrt(variance) })
+            .collect()
+    }
+}
+
+/// What the weights' last change may amount to, as a part of the variance: they are settled to one
+/// in a hundred.
+const ROUNDING: f64 = 0.02;
