@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use gonio::export::with_section;
+
 use crate::{Arguments, Machine, Table, Unmeasured};
 
 const PREFACE: &str = "# Measured
@@ -74,19 +76,6 @@ impl Section {
     }
 }
 
-/// The document with this section instead of the one of its name, or after the others.
-fn with_section(document: &str, name: &str, text: &str) -> String {
-    let (begin, end) = (format!("<!-- begin {name} -->\n"), format!("<!-- end {name} -->\n"));
-    let section = format!("{begin}{text}{end}");
-    let place = document.find(&begin).zip(document.find(&end));
-    match place {
-        Some((from, to)) if from < to => {
-            format!("{}{section}{}", &document[..from], &document[to + end.len()..])
-        }
-        _ => format!("{document}\n{section}"),
-    }
-}
-
 /// The command as a reader would give it, without what only concerns the document.
 fn command() -> String {
     let mut words = std::env::args();
@@ -111,19 +100,4 @@ fn write_whole(path: &Path, text: &str) -> Result<(), Unmeasured> {
     fs::write(&beside, text)?;
     fs::rename(&beside, path)?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_section_is_added_once_and_then_replaced_in_its_place() {
-        let one = with_section("# Head\n", "a", "first\n");
-        let two = with_section(&one, "b", "other\n");
-        let three = with_section(&two, "a", "second\n");
-        let expected = "# Head\n\n<!-- begin a -->\nsecond\n<!-- end a -->\n\n\
-                        <!-- begin b -->\nother\n<!-- end b -->\n";
-        assert_eq!(three, expected);
-    }
 }

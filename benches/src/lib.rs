@@ -4,7 +4,7 @@
 //!
 //! Outside the default members: `cargo test` neither builds nor runs them. They spawn the `gonio`
 //! that lies beside them, so build that first: `cargo build --release`, then
-//! `cargo run --release -p benches --bin coverage -- --doc docs/measured.md --date 2026-11-22`.
+//! `cargo run --release -p benches --bin kernels -- --doc docs/measured.md --date 2026-11-22`.
 
 mod arguments;
 pub mod bars;
@@ -29,7 +29,7 @@ pub use dice::Dice;
 pub use document::Section;
 pub use machine::{Machine, file_system_of};
 pub use program::{Program, Run, copy_example, edit};
-pub use statistics::{binomial_band, rms, rms_band};
+pub use statistics::{binomial_band, rms};
 pub use stopwatch::{Spread, call_ns, call_ns_in, repeat, repeat_together, timed};
 pub use table::Table;
 

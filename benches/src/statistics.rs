@@ -1,22 +1,10 @@
 //! What an honest answer looks like: the ranges in which 95 % of experiments fall when every
 //! stated uncertainty is right and every error normal.
 
-/// The normal distribution's 97.5 % quantile.
-const Z: f64 = 1.959_963_984_540_054;
-
 /// Root mean square.
 pub fn rms(numbers: &[f64]) -> f64 {
     let squares: f64 = numbers.iter().map(|number| number * number).sum();
     (squares / numbers.len() as f64).sqrt()
-}
-
-/// The central 95 % of the RMS of `n` independent standard normal numbers: sqrt(χ²/n), its
-/// quantiles by Wilson and Hilferty (1931), right to 1 % from n = 5 on.
-pub fn rms_band(n: usize) -> (f64, f64) {
-    let n = n as f64;
-    let spread = 2.0 / (9.0 * n);
-    let quantile = |z: f64| (1.0 - spread + z * spread.sqrt()).max(0.0).powi(3).sqrt();
-    (quantile(-Z), quantile(Z))
 }
 
 /// The least and the most of `n` independent numbers within ±2 u that central 95 % of experiments
@@ -48,15 +36,6 @@ pub fn binomial_band(n: usize) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_rms_band_is_that_of_the_chi_square_tables() {
-        // χ² of 100 degrees of freedom: 74.222 and 129.561 (any table). Of 10: 3.247 and 20.483.
-        let (low, high) = rms_band(100);
-        assert!((low - 0.861_52).abs() < 1e-3 && (high - 1.138_25).abs() < 1e-3, "{low} {high}");
-        let (low, high) = rms_band(10);
-        assert!((low - 0.569_8).abs() < 5e-3 && (high - 1.431_2).abs() < 5e-3, "{low} {high}");
-    }
 
     #[test]
     fn the_binomial_band_leaves_at_most_a_fortieth_on_either_side() {

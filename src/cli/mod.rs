@@ -32,6 +32,7 @@ mod setup;
 mod shop;
 mod simulated;
 mod stopping;
+mod study;
 mod summary;
 mod text;
 
@@ -39,7 +40,7 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use args::{Cli, Command};
+use args::{Cli, Command, Study};
 
 /// Parses the process's arguments and does what they ask.
 pub fn main() -> ExitCode {
@@ -52,6 +53,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::export(&args),
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),
+        Command::Study { study: Study::Coverage(args) } => study::coverage(&args),
         Command::Resume(args) => resume::resume(&args),
         Command::Home(args) => hand::home(&args),
         Command::Jog(args) => hand::jog(&args),

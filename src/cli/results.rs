@@ -160,6 +160,15 @@ impl Results {
     }
 }
 
+/// The fit of a run's readings as its plan asks for it, and nothing else: for studies of many runs.
+pub(crate) fn fit_of(setup: &Setup, readings: &[Reading]) -> Result<fit::Fit, Failure> {
+    let calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
+    let (region, optics) = (fit_region(setup), optics(setup));
+    let wish = &setup.plan.fit;
+    let fitted = calibrated.fit(&region, wish, optics.as_ref()).map_err(Failure::midway)?;
+    Ok(fitted.fit)
+}
+
 /// Copies of plan, rig and scene and of what they refer to, as they were read.
 pub(crate) fn write_inputs(folder: &Path, setup: &Setup) -> Result<(), ExportError> {
     for input in &setup.inputs {

@@ -8,7 +8,9 @@
 
 mod accuracy;
 mod atomic;
+mod coverage;
 mod derived;
+mod document;
 mod fit_file;
 mod frontier;
 mod input;
@@ -23,7 +25,9 @@ mod tests;
 
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
+pub use coverage::write_coverage;
 pub use derived::{DerivedKind, DerivedOutcome, DerivedQuantity, DerivedTable};
+pub use document::with_section;
 pub use fit_file::{FitFile, TruePeak, Truth};
 pub use frontier::write_frontier;
 pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};

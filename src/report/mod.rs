@@ -11,6 +11,7 @@ mod page;
 mod plane;
 mod polar;
 mod raster;
+mod scores;
 mod svg;
 mod ticks;
 
@@ -21,5 +22,6 @@ pub use hemisphere::Hemisphere;
 pub use page::{Report, Section, Table};
 pub use plane::Plane;
 pub use polar::Polar;
+pub use scores::{Cells, scores_svg};
 pub use svg::Picture;
 pub use ticks::significant;

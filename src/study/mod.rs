@@ -1,6 +1,8 @@
-//! Accuracy against time, the pure part: how good a fit is, and which plans to compare. It is
-//! handed a way to run a plan; it does not know rigs, clocks or files.
+//! Studies of many runs, the pure part: how good a fit is, which plans to compare, what accuracy
+//! costs in time, whether stated uncertainties hold. It is handed what runs found; it does not know
+//! rigs, clocks or files.
 
+pub mod coverage;
 mod frontier;
 mod ladder;
 mod score;

@@ -7,12 +7,14 @@
 #![allow(clippy::struct_excessive_bools)]
 
 mod fit;
+mod study;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use fit::FitArgs;
+pub(crate) use study::{CoverageArgs, FrontierArgs, Study};
 
 /// Controller for goniometer and spherical-gantry measurement rigs.
 ///
@@ -55,6 +57,13 @@ pub(crate) enum Command {
     ///
     /// Example: gonio frontier examples/lambertian/plan.toml --out frontier
     Frontier(FrontierArgs),
+    /// Answer what only many runs can: whether stated uncertainties cover the truth.
+    ///
+    /// Example: gonio study coverage --short
+    Study {
+        #[command(subcommand)]
+        study: Study,
+    },
     /// Show which physical effects a scene calls for, why, and which are left out.
     ///
     /// Example: gonio explain examples/luminaire/scene.toml --rig examples/luminaire/rig.toml
@@ -222,25 +231,6 @@ pub(crate) struct PlanArgs {
     #[command(flatten)]
     pub(crate) rig: RigArgs,
     /// Print one JSON document.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct FrontierArgs {
-    /// The plan whose schedule and dwell are scaled.
-    pub(crate) plan: PathBuf,
-    #[command(flatten)]
-    pub(crate) rig: RigArgs,
-    #[command(flatten)]
-    pub(crate) effects: EffectArgs,
-    /// How many seeds each rung is run with, from --seed upwards.
-    #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
-    pub(crate) seeds: u64,
-    /// The folder for frontier.csv and frontier.svg; must not hold them yet. Default: frontier-NAME-UTC.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-    /// Print the table as JSON lines.
     #[arg(long)]
     pub(crate) json: bool,
 }

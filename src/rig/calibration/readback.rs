@@ -73,7 +73,7 @@ pub(super) fn components(
     all
 }
 
-/// A coin for each position and combination, always the same (SplitMix64).
+/// A coin for each position and combination, always the same (`SplitMix64`).
 fn sign(bits: u64, k: u64) -> bool {
     let mut z = bits ^ k.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -1,0 +1,306 @@
+//! `gonio study coverage`: many runs on simulated rigs, each of another scene, rig and noise, through
+//! the wire, the journal, the calibration and the fit that `gonio run` has; how often the stated
+//! intervals hold the truth.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget};
+use radiometry::quadrature::gauss_legendre;
+
+use super::document::{Document, section, summary};
+use crate::cli::acquire::{Acquired, Pace, acquire};
+use crate::cli::args::CoverageArgs;
+use crate::cli::failure::{Failure, Outcome};
+use crate::cli::folder::create;
+use crate::cli::output::{note, say, write_out};
+use crate::cli::results::{fit_of, fit_region};
+use crate::cli::run::first_job;
+use crate::cli::session::utc_stamp;
+use crate::cli::setup::Setup;
+use crate::export::{write_atomically, write_coverage};
+use crate::journal::{EffectWishes, Input, InputRole, Order};
+use crate::report::{Cells, scores_svg};
+use crate::rig::Rig;
+use crate::run::OnFault;
+use crate::study::coverage::{
+    Cell, Draws, FAMILIES, Family, Kind, Pool, Run, Scale, Score, Target, binomial_band, demands,
+    tally, targets,
+};
+
+/// Of a real lamp; CC0 as its notice beside it says.
+const PHOTOMETRIC: &str = include_str!("../../../examples/luminaire/ushio_b1.ies");
+/// Runs a scene of the short study.
+const SHORT_RUNS: usize = 12;
+/// Scenes of the short study: one that the basis follows, one that it does not.
+const SHORT: [Family; 2] = [Family::Lobe, Family::AnyLobe];
+/// Nodes a side of a mean over the region.
+const NODES: usize = 8;
+
+/// What came of all runs.
+pub(super) struct Studied {
+    pub(super) runs: usize,
+    pub(super) seed: u64,
+    pub(super) families: Vec<Family>,
+    pub(super) cells: Vec<Cell>,
+    pub(super) pools: Vec<Pool>,
+    /// Why runs came to no fit, one sentence each.
+    pub(super) refused: Vec<String>,
+}
+
+/// A run to make.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    family: usize,
+    scale: usize,
+    run: usize,
+}
+
+/// Makes the runs, writes what they say, and answers whether every demand was met.
+pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
+    let document = Document::asked(args)?;
+    let families = families(args)?;
+    let runs = args.runs.unwrap_or(if args.short { SHORT_RUNS } else { 1000 });
+    let folder =
+        args.out.clone().unwrap_or_else(|| PathBuf::from(format!("coverage-{}", utc_stamp())));
+    if folder.exists() {
+        return Err(Failure::with_help(
+            format!("{}: exists already; nothing is overwritten", folder.display()),
+            "choose another folder with --out",
+        ));
+    }
+    let work = folder.join("runs");
+    std::fs::create_dir_all(&work)
+        .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
+    let studied = study(families, runs, args.seed, &work)?;
+    // Ours, and empty but for runs that were refused.
+    let _ = std::fs::remove_dir_all(&work);
+    let demands = demands(&studied.cells, &studied.pools);
+    let svg = picture(&studied);
+    write_atomically(&folder.join("coverage.csv"), |out| write_coverage(out, &studied.cells))
+        .and_then(|()| {
+            write_atomically(&folder.join("coverage.svg"), |out| out.write_all(svg.as_bytes()))
+        })
+        .map_err(Failure::midway)?;
+    if let Some(document) = document {
+        document.write(&section(&studied, &demands, &document), &svg)?;
+    }
+    for refused in &studied.refused {
+        note(&format!("no fit: {refused}"));
+    }
+    if args.json {
+        write_out(|out| super::document::write_json(out, &studied, &demands))?;
+    } else {
+        let shown = folder.display();
+        say(&format!("{}  folder {shown}\n", summary(&studied, &demands)))?;
+    }
+    let is_met = demands.iter().all(|demand| demand.is_met) && studied.refused.is_empty();
+    Ok(if is_met { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn families(args: &CoverageArgs) -> Result<Vec<Family>, Failure> {
+    if args.scenes.is_empty() {
+        return Ok(if args.short { SHORT.to_vec() } else { FAMILIES.to_vec() });
+    }
+    let named = |name: &String| {
+        FAMILIES.into_iter().find(|family| family.name() == name).ok_or_else(|| {
+            let known: Vec<&str> = FAMILIES.iter().map(|family| family.name()).collect();
+            Failure::with_help(
+                format!("--scenes: there is no `{name}`"),
+                format!("choose among {}", known.join(", ")),
+            )
+        })
+    };
+    args.scenes.iter().map(named).collect()
+}
+
+/// Every scene on rigs of both kinds, so many runs each, on as many threads as the machine has.
+fn study(families: Vec<Family>, runs: usize, seed: u64, work: &Path) -> Result<Studied, Failure> {
+    let rig = Rig::built_in()?.document().source().text().to_owned();
+    let entries: Vec<Entry> = (0..families.len())
+        .flat_map(|family| (0..Scale::ALL.len()).map(move |scale| (family, scale)))
+        .flat_map(|(family, scale)| (0..runs).map(move |run| Entry { family, scale, run }))
+        .collect();
+    let one = |entry: &Entry| {
+        let (family, scale) = (families[entry.family], Scale::ALL[entry.scale]);
+        // A family's number among all, so that a study of one repeats what it was among others.
+        let place = FAMILIES.iter().position(|f| *f == family).unwrap_or(0);
+        let mut draws = Draws::at(seed, &[place as u64, entry.scale as u64, entry.run as u64]);
+        let folder = work.join(format!("{}-{}-{}", family.name(), entry.scale, entry.run));
+        run_one(family, scale, &mut draws, &rig, &folder)
+            .map_err(|failure| format!("{}, run {}: {}", family.name(), entry.run, failure.text()))
+    };
+    let done = in_parallel(&entries, one);
+    let mut refused = Vec::new();
+    let (mut cells, mut pools) = (Vec::new(), Vec::new());
+    for scale in 0..Scale::ALL.len() {
+        let mut followed: Vec<(Vec<Target>, Vec<Run>)> = Vec::new();
+        for (i, family) in families.iter().enumerate() {
+            let mine = entries.iter().zip(&done).filter(|(e, _)| e.family == i && e.scale == scale);
+            let mut found = Vec::new();
+            let mut asked = Vec::new();
+            for (_, outcome) in mine {
+                match outcome {
+                    Some(Ok((targets, run))) => {
+                        asked.clone_from(targets);
+                        found.push(run.clone());
+                    }
+                    Some(Err(why)) => refused.push(why.clone()),
+                    None => refused.push(format!("{}: a thread panicked", family.name())),
+                }
+            }
+            if found.is_empty() {
+                continue;
+            }
+            let scale = Scale::ALL[scale];
+            cells.extend(Cell::of(*family, scale, &asked, &found));
+            pools.extend(pools_of(Some(*family), scale, &[(asked.clone(), found.clone())]));
+            if !family.is_limited_by_basis() {
+                followed.push((asked, found));
+            }
+        }
+        pools.extend(pools_of(None, Scale::ALL[scale], &followed));
+    }
+    Ok(Studied { runs, seed, families, cells, pools, refused })
+}
+
+/// The pools of one kind of rig, a quantity each.
+fn pools_of(family: Option<Family>, scale: Scale, parts: &[(Vec<Target>, Vec<Run>)]) -> Vec<Pool> {
+    let runs: usize = parts.iter().map(|(_, runs)| runs.len()).sum();
+    let pool = |kind: Kind| {
+        let scores = parts.iter().flat_map(|(targets, runs)| {
+            runs.iter().flat_map(move |run| {
+                let of_kind = run.scores.iter().zip(targets).filter(move |(_, t)| t.kind == kind);
+                of_kind.map(|(score, _)| score)
+            })
+        });
+        Pool { family, scale, kind, runs, tally: tally(scores) }
+    };
+    if runs == 0 { Vec::new() } else { Kind::ALL.into_iter().map(pool).collect() }
+}
+
+/// Answers in the entries' order; `None` where a thread came to grief.
+fn in_parallel<T: Send>(entries: &[Entry], one: impl Fn(&Entry) -> T + Sync) -> Vec<Option<T>> {
+    let bar = ProgressBar::with_draw_target(
+        Some(entries.len() as u64),
+        ProgressDrawTarget::stderr_with_hz(5),
+    );
+    let next = AtomicUsize::new(0);
+    let slots: Vec<Mutex<Option<T>>> = entries.iter().map(|_| Mutex::new(None)).collect();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(entries.len()) {
+            scope.spawn(|| {
+                loop {
+                    let place = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(entry) = entries.get(place) else { break };
+                    let answer = one(entry);
+                    bar.inc(1);
+                    if let Ok(mut slot) = slots[place].lock() {
+                        *slot = Some(answer);
+                    }
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    slots.into_iter().map(|slot| slot.into_inner().ok().flatten()).collect()
+}
+
+/// One run of a scene as drawn, from the wire to the scores.
+fn run_one(
+    family: Family,
+    scale: Scale,
+    draws: &mut Draws,
+    rig: &str,
+    folder: &Path,
+) -> Result<(Vec<Target>, Run), Failure> {
+    let drawn = family.draw(draws, scale, rig, PHOTOMETRIC);
+    let input = |role, name: &str, bytes: &[u8]| Input {
+        role,
+        name: name.to_owned(),
+        bytes: bytes.to_vec(),
+    };
+    let mut inputs = vec![
+        input(InputRole::Plan, "plan.toml", drawn.plan.as_bytes()),
+        input(InputRole::Rig, "rig.toml", drawn.rig.as_bytes()),
+        input(InputRole::Scene, "scene.toml", drawn.scene.as_bytes()),
+    ];
+    let attached = drawn.attachments.iter();
+    inputs.extend(attached.map(|a| input(InputRole::Attachment, &a.name, &a.bytes)));
+    let setup = Setup::from_inputs(inputs, None, draws.seed(), EffectWishes::default())?;
+    let acquired = acquire(&setup, Pace::Virtual, || {
+        let (journal, _) = create(folder, &setup)?;
+        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
+    })?;
+    let Acquired { journal, .. } = acquired;
+    let journal = journal.map_err(Failure::midway)?;
+    let readings = journal.reader().readings(Order::Taken)?;
+    journal.close().map_err(Failure::midway)?;
+    // Thousands of journals would fill a disk.
+    let _ = std::fs::remove_dir_all(folder);
+    scored(&setup, &fit_of(&setup, &readings)?)
+}
+
+fn scored(setup: &Setup, fit: &fit::Fit) -> Result<(Vec<Target>, Run), Failure> {
+    let region = fit_region(setup);
+    let truth = setup.truth().ok_or_else(|| Failure::midway("the rig is not simulated"))?;
+    let exitance = truth.exitance();
+    let score = |target: &Target| -> Score {
+        let (estimate, truth) = match (target.kind, target.ray) {
+            (Kind::ExitanceWithin, _) => {
+                (fit.exitance_within_region(), truth.exitance_within_region())
+            }
+            (Kind::Flux, _) => (fit.flux(), truth.flux()),
+            (Kind::Intensity, Some(ray)) => (
+                fit.intensity(ray.theta_rad, ray.phi_rad),
+                intensity(&truth, ray.theta_rad, ray.phi_rad),
+            ),
+            (Kind::Radiance, Some(ray)) => {
+                let radiance = truth.radiance(ray.x_m, ray.y_m, ray.theta_rad, ray.phi_rad);
+                (fit.radiance(&ray), radiance)
+            }
+            _ => (fit.exitance(), exitance),
+        };
+        Score::of(estimate.value, estimate.u, truth)
+    };
+    let targets = targets(&region);
+    let scores = targets.iter().map(score).collect();
+    Ok((targets, Run { scores }))
+}
+
+/// ∫ L cos θ dA over the region, of the truth.
+fn intensity(truth: &sim::Truth<'_>, theta_rad: f64, phi_rad: f64) -> f64 {
+    let region = truth.region();
+    let at = |(low, high): (f64, f64), t: f64| f64::midpoint(low, high) + 0.5 * t * (high - low);
+    let rule = gauss_legendre(NODES);
+    let mut mean = 0.0;
+    for (s, weight_x) in &rule {
+        for (t, weight_y) in &rule {
+            let (x_m, y_m) = (at(region.x_m, *s), at(region.y_m, *t));
+            mean += 0.25 * weight_x * weight_y * truth.radiance(x_m, y_m, theta_rad, phi_rad);
+        }
+    }
+    mean * region.area_m2() * libm::cos(theta_rad)
+}
+
+/// The cells of the rigs that know their scale: those of the others all lie at 1 and 95 %.
+fn picture(studied: &Studied) -> String {
+    let group = |family: &Family| Cells {
+        name: family.name().to_owned(),
+        is_cross: family.is_limited_by_basis(),
+        cells: studied
+            .cells
+            .iter()
+            .filter(|cell| cell.family == *family && cell.scale == Scale::Known)
+            .map(|cell| (cell.tally.rms, cell.tally.coverage()))
+            .collect(),
+    };
+    let groups: Vec<Cells> = studied.families.iter().map(group).collect();
+    let (least, most) = binomial_band(studied.runs, 0.95);
+    let part = |count: usize| count as f64 / studied.runs as f64;
+    let title = format!("Coverage, scale known exactly, {} runs a scene", studied.runs);
+    scores_svg(&title, &groups, (part(least), part(most)))
+}
