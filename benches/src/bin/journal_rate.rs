@@ -212,6 +212,7 @@ fn record(id: u32) -> Record {
         max: 126_727,
         saturated: 0,
         commanded: latched(0),
+        travel: Latched([0; 4]),
         start: latched(1),
         end: latched(1),
         start_us: i64::from(id) * 500_000,
