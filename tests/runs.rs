@@ -26,7 +26,8 @@ fn rows(text: &str) -> Vec<Vec<&str>> {
 #[test]
 fn every_example_leaves_a_whole_folder() {
     std::thread::scope(|scope| {
-        for example in ["batwing", "lambertian", "led-lobe", "luminaire", "sun-window"] {
+        for example in ["batwing", "lambertian", "led-lobe", "luminaire", "penumbra", "sun-window"]
+        {
             scope.spawn(move || leaves_a_whole_folder(example));
         }
     });

@@ -11,6 +11,7 @@ mod cut;
 pub(crate) mod design;
 mod directions;
 mod lens;
+mod moments;
 mod outline;
 mod sight;
 mod way;
@@ -23,6 +24,7 @@ use crate::{FitError, Ray};
 use bound::Bound;
 use cut::{Cuts, Cutter};
 use directions::{Directions, Node};
+use moments::Moments;
 use sight::{Shear, Sight};
 
 pub use outline::Outline;
@@ -135,6 +137,20 @@ impl Averager {
         scratch: &mut Means,
         out: &mut [f64],
     ) {
+        if !self.row_of_moments(rule, ray, basis, scratch, out) {
+            self.row_of_places(rule, ray, basis, scratch, out);
+        }
+    }
+
+    /// The same, place by place.
+    fn row_of_places(
+        &self,
+        rule: &Directions,
+        ray: &Ray,
+        basis: &Basis,
+        scratch: &mut Means,
+        out: &mut [f64],
+    ) {
         out.fill(0.0);
         let sight = Sight::new(ray);
         for node in &rule.nodes {
@@ -207,12 +223,14 @@ impl Averager {
     }
 }
 
-/// Scratch of one average: the position terms' mean over places, and the functions of direction.
+/// Scratch of one average: the position terms' mean over places, and the functions of direction; and
+/// what averages before have found out.
 #[derive(Debug)]
 pub(crate) struct Means {
     place: Scratch,
     position: Vec<f64>,
     direction: Vec<f64>,
+    moments: Moments,
 }
 
 impl Means {
@@ -221,6 +239,7 @@ impl Means {
             place: basis.scratch(),
             position: vec![0.0; basis.position_len()],
             direction: vec![0.0; basis.angular_len()],
+            moments: Moments::default(),
         }
     }
 
