@@ -2,11 +2,12 @@
 //! detector, noise and beam. Of patches that emit they are exact; of what is lit, raised or behind
 //! glass they are integrals, with a bound of their error.
 
-use core::f64::consts::{PI, TAU};
+use core::cell::{Cell, OnceCell};
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec2;
 use radiometry::direction::{angles, wrap};
-use radiometry::quadrature::{Cell, cubature, quasi_monte_carlo};
+use radiometry::quadrature::{self, cubature, quasi_monte_carlo};
 use radiometry::{Estimate, EstimateError, Tolerance};
 
 use crate::Scene;
@@ -47,16 +48,25 @@ pub struct Peak {
 }
 
 /// What leaves the sample in a region.
-#[derive(Debug, Clone, Copy)]
+///
+/// What is integrated, is so once: ask one `Truth` for all that is wanted.
+#[derive(Debug, Clone)]
 pub struct Truth<'c> {
     scene: &'c Scene,
     field: &'c dyn Field,
     region: Region,
+    /// Over the hemisphere.
+    exitance: OnceCell<f64>,
+    /// Of what goes alike into all directions: the mean radiance over the region, and the place that
+    /// was asked for last, with its radiance.
+    mean: OnceCell<Estimate>,
+    last: Cell<Option<(DVec2, f64)>>,
 }
 
 impl<'c> Truth<'c> {
     pub(crate) const fn new(scene: &'c Scene, field: &'c dyn Field, region: Region) -> Self {
-        Self { scene, field, region }
+        let (exitance, mean, last) = (OnceCell::new(), OnceCell::new(), Cell::new(None));
+        Self { scene, field, region, exitance, mean, last }
     }
 
     /// The region that it is taken over.
@@ -67,13 +77,25 @@ impl<'c> Truth<'c> {
     /// Radiance along the ray that crosses the plane at (x, y) into (θ, φ), W·m⁻²·sr⁻¹ or cd·m⁻².
     /// Zero where nothing is.
     pub fn radiance(&self, x_m: f64, y_m: f64, theta_rad: f64, phi_rad: f64) -> f64 {
-        self.field.radiance(&Ray::new(x_m, y_m, theta_rad, phi_rad))
+        let along = || self.field.radiance(&Ray::new(x_m, y_m, theta_rad, phi_rad));
+        if theta_rad > FRAC_PI_2 || !self.field.is_even() {
+            return along();
+        }
+        let place = DVec2::new(x_m, y_m);
+        match self.last.get() {
+            Some((last, radiance)) if last == place => radiance,
+            _ => {
+                let radiance = along();
+                self.last.set(Some((place, radiance)));
+                radiance
+            }
+        }
     }
 
     /// Exitance into the whole hemisphere, the mean over the region's rectangle, W·m⁻² or
     /// lm·m⁻².
     pub fn exitance(&self) -> f64 {
-        self.exitance_up_to(core::f64::consts::FRAC_PI_2)
+        *self.exitance.get_or_init(|| self.exitance_up_to(FRAC_PI_2))
     }
 
     /// As [`Truth::exitance`], into the region's directions alone.
@@ -128,16 +150,7 @@ impl<'c> Truth<'c> {
         let sin_square = libm::sin(theta_max_rad) * libm::sin(theta_max_rad);
         if self.field.is_even() {
             // The same into all directions: π sin²θ times the mean over places.
-            let low = DVec2::new(x_m.0, y_m.0);
-            let step = (DVec2::new(x_m.1, y_m.1) - low) / f64::from(CELLS);
-            let corner =
-                |i: u32| low + step * DVec2::new(f64::from(i % CELLS), f64::from(i / CELLS));
-            let cells = (0..CELLS * CELLS).map(corner).map(|at| Cell::Rectangle(at, at + step));
-            let cells: Vec<Cell> = cells.collect();
-            let along = |place: DVec2| self.radiance(place.x, place.y, 0.0, 0.0);
-            let tolerance = Tolerance::new(EVEN_RELATIVE, 0.0, BUDGET);
-            let mean = tolerance.map_err(Into::into).and_then(|t| cubature(along, &cells, t));
-            known(mean).scaled(PI * sin_square / self.region.area_m2())
+            self.mean.get_or_init(|| self.mean_over_places()).scaled(PI * sin_square)
         } else {
             // Over places and the disk of (sin θ cos φ, sin θ sin φ), in equal parts of it.
             let along = |at: &[f64; 4]| {
@@ -150,6 +163,21 @@ impl<'c> Truth<'c> {
             let mean = tolerance.map_err(Into::into).and_then(|t| quasi_monte_carlo(along, 1, t));
             known(mean).scaled(PI * sin_square)
         }
+    }
+
+    /// The mean over the region of what goes alike into all directions.
+    fn mean_over_places(&self) -> Estimate {
+        let Region { x_m, y_m, .. } = self.region;
+        let low = DVec2::new(x_m.0, y_m.0);
+        let step = (DVec2::new(x_m.1, y_m.1) - low) / f64::from(CELLS);
+        let corner = |i: u32| low + step * DVec2::new(f64::from(i % CELLS), f64::from(i / CELLS));
+        let cells =
+            (0..CELLS * CELLS).map(corner).map(|at| quadrature::Cell::Rectangle(at, at + step));
+        let cells: Vec<quadrature::Cell> = cells.collect();
+        let along = |place: DVec2| self.radiance(place.x, place.y, 0.0, 0.0);
+        let tolerance = Tolerance::new(EVEN_RELATIVE, 0.0, BUDGET);
+        let mean = tolerance.map_err(Into::into).and_then(|t| cubature(along, &cells, t));
+        known(mean).scaled(1.0 / self.region.area_m2())
     }
 
     /// The brightest of the region's landmarks, and from there uphill.

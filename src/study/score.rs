@@ -60,16 +60,17 @@ fn pairs(
 ) -> Vec<(f64, f64, f64)> {
     let sin_max = libm::sin(region.theta_max_rad);
     let scale = |(low, high): (f64, f64), t: f64| low + (high - low) * 0.5 * (1.0 + t);
-    let positions = position_nodes();
+    let (positions, polar) = (position_nodes(), gauss_legendre(THETA_NODES));
     let mut pairs = Vec::new();
-    for (t, weight_theta) in gauss_legendre(THETA_NODES) {
-        let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin_max * sin_max), t)));
-        for k in 0..PHI_NODES {
-            let turn = (f64::from(k) + 0.5) / f64::from(PHI_NODES);
-            let phi_rad = (2.0 * turn - 1.0) * core::f64::consts::PI;
-            for (tx, weight_x) in &positions {
-                for (ty, weight_y) in &positions {
-                    let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
+    // Place by place: what is the same into all directions is then known from the last.
+    for (tx, weight_x) in &positions {
+        for (ty, weight_y) in &positions {
+            let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
+            for (t, weight_theta) in &polar {
+                let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin_max * sin_max), *t)));
+                for k in 0..PHI_NODES {
+                    let turn = (f64::from(k) + 0.5) / f64::from(PHI_NODES);
+                    let phi_rad = (2.0 * turn - 1.0) * core::f64::consts::PI;
                     let ray = Ray { x_m, y_m, theta_rad, phi_rad };
                     let weight = weight_theta * weight_x * weight_y;
                     pairs.push((weight, fitted(&ray), truth(&ray)));
