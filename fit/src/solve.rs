@@ -185,7 +185,7 @@ fn triangle(
 /// Whether a component's effect has to go through the factorisation. A scale and an offset don't:
 /// the fit is linear and holds the constant, so that their effect on the coefficients is known;
 /// only that an offset of beams that are cut is no constant field.
-fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
+pub(crate) fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
     match common.shift {
         Shift::Scale | Shift::Jitter(_) => false,
         Shift::Offset => !design.holds_constant(),
@@ -194,7 +194,7 @@ fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
 }
 
 /// The change of every value by one u of each component.
-fn sensitivities(
+pub(crate) fn sensitivities(
     design: &Design<'_>,
     settled: &Settled,
     common: &[&Common],
@@ -223,7 +223,7 @@ fn sensitivities(
 }
 
 /// The coefficients' shift by one u of each component, in the order handed in.
-fn shifts(
+pub(crate) fn shifts(
     common: &[&Common],
     coefficients: &[f64],
     design: &Design<'_>,

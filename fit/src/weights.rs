@@ -80,7 +80,7 @@ fn start(samples: &[Sample], model: Model) -> Settled {
 }
 
 /// The variance of each sample by rays that are off each on its own.
-fn moved(
+pub(crate) fn moved(
     design: &Design<'_>,
     coefficients: &[f64],
     jitters: &[&Common],

@@ -1,0 +1,182 @@
+//! What a fit will know before anything is measured: the same rows, weights and factorisation as a
+//! fit's, with expected radiances in the place of values. It has no noise, and so no residuals of
+//! its own: what is fitted is what was expected, as far as the basis follows it.
+//!
+//! How far the basis follows other fields is asked along with it, as further right-hand sides.
+
+use crate::basis::{Basis, dot};
+use crate::beam::Optics;
+use crate::beam::design::Design;
+use crate::check::check;
+use crate::fitted::{CommonShift, Fit, Parts, Quality};
+use crate::penalty::{Penalised, Prior};
+use crate::solve::{left_over, needs_a_side, sensitivities, shifts, solve};
+use crate::weights::{Model, Settled, moved};
+use crate::{Common, FitError, Noise, Ray, Region, Sample, undetermined};
+
+/// What a fit is going to know.
+#[derive(Debug, Clone)]
+pub struct Predicted {
+    /// The fit of the expected radiances, with the covariance that the readings will give it. Its
+    /// residuals are those of the basis, its chi2 is its degrees of freedom.
+    pub fit: Fit,
+    /// What the same readings make of each field, without noise.
+    pub fields: Vec<FittedField>,
+}
+
+/// A field as the basis and the poses show it.
+#[derive(Debug, Clone)]
+pub struct FittedField {
+    /// The fit to its readings. Its covariance is that of the expected radiances' fit, without
+    /// common components.
+    pub fit: Fit,
+    /// Root mean square of reading less fit, in the field's unit: what the basis can't follow.
+    pub residual_rms: f64,
+}
+
+/// Predicts the fit of [`fit_flown`](crate::fit_flown). A sample's `value` is the radiance that is expected along
+/// its ray; of a beam that reaches beyond the sample only the part on it sees that much. Its noise
+/// is taken at that level. `fields` are the radiances of other fields along the same rays, one a
+/// sample, of any unit.
+///
+/// The radiance is taken to be even within a beam: for features narrower than the beam the
+/// prediction is too good. An excess over the stated noise is not foreseen; add what is known of it
+/// to the variances. Refuses what [`fit_flown`](crate::fit_flown) refuses, and [`Noise::Unknown`].
+///
+/// ```
+/// use fit::{BasisSpec, Common, Noise, Ray, Region, Sample, Shift};
+///
+/// // 24 directions, radiances of about 100 read to 0.1: what will the exitance be known to?
+/// let ray = |i: u32| {
+///     Ray { x_m: 0.0, y_m: 0.0, theta_rad: f64::from(i % 8) * 0.2, phi_rad: f64::from(i / 8) * 2.1 }
+/// };
+/// let noise = Noise::Fixed { variance: 0.01 };
+/// let expected: Vec<Sample> =
+///     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
+/// let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+/// let scale = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
+/// let basis = BasisSpec::zernike(2, 0);
+/// let predicted = fit::predict(&expected, &[], &region, basis, &[scale], None, &[])?;
+/// let exitance = predicted.fit.exitance();
+/// assert!((exitance.u / exitance.value - 0.02).abs() < 1e-4);
+/// assert!(exitance.u_independent / exitance.value < 1e-3);
+/// # Ok::<(), fit::FitError>(())
+/// ```
+pub fn predict(
+    samples: &[Sample],
+    flown: &[Option<(Ray, Ray)>],
+    region: &Region,
+    model: impl Into<Penalised>,
+    common: &[Common],
+    optics: Option<&Optics>,
+    fields: &[Vec<f64>],
+) -> Result<Predicted, FitError> {
+    let model = model.into();
+    check(samples, region, model, common)?;
+    check_fields(samples, fields)?;
+    let basis = Basis::new(model.basis, *region)?;
+    let prior = Prior::new(&basis, model.penalty)?;
+    if prior.is_none()
+        && let Some(refusal) = undetermined::by_count(samples, &basis)
+    {
+        return Err(refusal);
+    }
+    let design = Design::new(samples, &basis, optics)?.in_flight(flown);
+    let on_sample = on_sample(&design);
+    let seen = |along: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
+        along.zip(&on_sample).map(|(value, part)| value * part).collect()
+    };
+    let expected = seen(&mut samples.iter().map(|sample| sample.value));
+    let noise = Model::of(samples);
+    let variance = |(sample, level): (&Sample, &f64)| noise.variance(sample.noise, *level);
+    let variances: Vec<f64> = samples.iter().zip(&expected).map(variance).collect();
+
+    let mut sides = vec![expected];
+    sides.extend(fields.iter().map(|field| seen(&mut field.iter().copied())));
+    let solution = solve(&design, &variances, &sides, &prior)?;
+    let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+    if prior.is_none() && spectrum.rank() < basis.len() {
+        return Err(undetermined::by_rank(samples, &basis));
+    }
+    let coefficients: Vec<Vec<f64>> =
+        (1..=sides.len()).map(|side| solution.unknowns(side)).collect();
+    let residuals: Vec<f64> =
+        sides.iter().zip(&coefficients).map(|(side, c)| residual_rms(&design, side, c)).collect();
+
+    let settled = Settled {
+        coefficients: coefficients[0].clone(),
+        levels: sides.swap_remove(0),
+        variances,
+        excess: 0.0,
+    };
+    let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c, &design)).collect();
+    let shifts = if shifting.is_empty() {
+        shifts(common, &settled.coefficients, &design, &solution)
+    } else {
+        let sides = sensitivities(&design, &settled, &shifting)?;
+        let carried = solve(&design, &settled.variances, &sides, &prior)?;
+        shifts(common, &settled.coefficients, &design, &carried)
+    };
+    let factor = solution.inverse();
+    let determined = prior.determined_by(&solution);
+    let dof = left_over(samples.len(), determined);
+    let quality = Quality {
+        condition: spectrum.condition(),
+        n_used: samples.len(),
+        dof,
+        determined,
+        residual_rms: residuals[0],
+        chi2: dof as f64,
+        excess_rms: 0.0,
+        beam: design.rows(&settled.variances),
+    };
+    let region = *region;
+    let fit = |coefficients: Vec<f64>, shifts: Vec<CommonShift>, quality: Quality| {
+        let factor = factor.clone();
+        Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality })
+            .map_err(|_| FitError::OutOfRange)
+    };
+    let mut fitted = coefficients.into_iter().zip(residuals);
+    let (expected, _) = fitted.next().ok_or(FitError::Empty)?;
+    let fields = fitted.map(|(coefficients, residual_rms)| {
+        let quality = Quality { residual_rms, ..quality };
+        Ok(FittedField { fit: fit(coefficients, Vec::new(), quality)?, residual_rms })
+    });
+    Ok(Predicted {
+        fields: fields.collect::<Result<_, FitError>>()?,
+        fit: fit(expected, shifts, quality)?,
+    })
+}
+
+fn check_fields(samples: &[Sample], fields: &[Vec<f64>]) -> Result<(), FitError> {
+    if let Some(index) = samples.iter().position(|sample| sample.noise == Noise::Unknown) {
+        return Err(FitError::Variance { index, what: "stated noise", value: 0.0 });
+    }
+    for field in fields {
+        let found = field.iter().filter(|value| value.is_finite()).count();
+        if found != samples.len() || field.len() != samples.len() {
+            return Err(FitError::Parts { what: "field", expected: samples.len(), found });
+        }
+    }
+    Ok(())
+}
+
+/// How much of each beam sees the sample.
+fn on_sample(design: &Design<'_>) -> Vec<f64> {
+    if design.holds_constant() {
+        return vec![1.0; design.samples().len()];
+    }
+    let unity = design.basis().unity();
+    let mut room = design.room();
+    (0..design.samples().len()).map(|i| design.level(i, &unity, &mut room)).collect()
+}
+
+fn residual_rms(design: &Design<'_>, readings: &[f64], coefficients: &[f64]) -> f64 {
+    let mut room = design.room();
+    let mut row = vec![0.0; coefficients.len()];
+    let squares = readings.iter().enumerate().map(|(i, reading)| {
+        design.row(i, &mut room, &mut row);
+        (reading - dot(&row, coefficients)).powi(2)
+    });
+    (squares.sum::<f64>() / readings.len() as f64).sqrt()
+}
