@@ -85,11 +85,18 @@ fn median(sorted: &[f64]) -> f64 {
     if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
+/// A shape that errs by less errs by rounding, about which time decides nothing.
+const ROUNDING: f64 = 1e-12;
+/// Points nearer to each other in time say nothing of twice the time.
+const TIME_MIN: f64 = 1.05;
+
 /// In words, what twice the time buys between two neighbouring points: the factor on the error
-/// of the radiance's shape, by the power law through both.
+/// of the radiance's shape, by the power law through both. `None` where no law can be told: the
+/// errors are rounding, or the times are as good as equal.
 pub fn doubling(lower: &FrontierPoint, upper: &FrontierPoint) -> Option<String> {
     let (time, error) = (upper.rig_s / lower.rig_s, upper.shape[1] / lower.shape[1]);
-    if time <= 1.0 || !error.is_finite() || error <= 0.0 {
+    let is_rounding = |point: &FrontierPoint| point.shape[1] <= ROUNDING;
+    if time < TIME_MIN || !error.is_finite() || [lower, upper].into_iter().any(is_rounding) {
         return None;
     }
     let factor = libm::exp2(libm::log(error) / libm::log(time));
@@ -165,6 +172,19 @@ mod tests {
         let coverage = coverage(&rows);
         assert!((coverage.within_2u - 0.5).abs() < 1e-15);
         assert!((coverage.rms_of_error_over_u - libm::sqrt(5.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rounding_and_equal_times_tell_no_law() {
+        let between = |lower: FrontierRow, upper: FrontierRow| {
+            let points = points(&[lower, upper]);
+            doubling(&points[0], &points[1])
+        };
+        // An even source that the fit holds exactly: its errors are a few ulp, one way or the other.
+        assert_eq!(between(row("a", 1, 100.0, 2e-16), row("b", 1, 101.0, 9e-16)), None);
+        assert_eq!(between(row("a", 1, 100.0, 0.02), row("b", 1, 200.0, 1e-16)), None);
+        assert_eq!(between(row("a", 1, 100.0, 0.02), row("b", 1, 101.0, 0.03)), None);
+        assert!(between(row("a", 1, 100.0, 0.02), row("b", 1, 200.0, 0.03)).is_some());
     }
 
     #[test]
