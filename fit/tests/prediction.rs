@@ -47,7 +47,9 @@ fn what_is_expected_exactly_has_the_covariance_of_its_fit() {
     let optics = Optics { beam, outline: None };
     let fitted = fit::fit_seen(&samples(field), &REGION, basis, &common(), Some(&optics)).unwrap();
     let predicted =
-        fit::predict(&samples(field), &[], &REGION, basis, &common(), Some(&optics), &[]).unwrap().fit;
+        fit::predict(&samples(field), &[], &REGION, basis, &common(), Some(&optics), &[])
+            .unwrap()
+            .fit;
     // The beam blurs the field a little, and the weights settle to a percent.
     close(predicted.exitance().value, fitted.exitance().value, 1e-3);
     for ((a, b), name) in
@@ -64,7 +66,8 @@ fn a_field_beyond_the_basis_is_fitted_as_readings_of_it_would_be() {
     let lobe = |ray: &Ray| 30.0 * (-8.0 * (ray.theta_rad - 0.6).powi(2)).exp();
     let basis = BasisSpec::zernike(4, 0);
     let values: Vec<f64> = rays().iter().map(lobe).collect();
-    let predicted = fit::predict(&samples(|_| 50.0), &[], &REGION, basis, &[], None, &[values]).unwrap();
+    let predicted =
+        fit::predict(&samples(|_| 50.0), &[], &REGION, basis, &[], None, &[values]).unwrap();
     // Equal weights, as an even expectation has.
     let noise = Noise::Fixed { variance: 1.0 };
     let readings: Vec<Sample> =
@@ -95,10 +98,13 @@ fn a_beam_half_off_the_sample_is_expected_to_read_half() {
 fn what_a_fit_refuses_is_refused_before_it() {
     let basis = BasisSpec::zernike(2, 0);
     let mut one_azimuth = samples(field);
-    one_azimuth.iter_mut().for_each(|sample| sample.ray.phi_rad = 0.3);
+    for sample in &mut one_azimuth {
+        sample.ray.phi_rad = 0.3;
+    }
     let refused = fit::predict(&one_azimuth, &[], &REGION, basis, &[], None, &[]).unwrap_err();
     assert!(matches!(refused, FitError::Undetermined { .. }), "{refused}");
-    let short = fit::predict(&samples(field), &[], &REGION, basis, &[], None, &[vec![1.0]]).unwrap_err();
+    let short =
+        fit::predict(&samples(field), &[], &REGION, basis, &[], None, &[vec![1.0]]).unwrap_err();
     assert_eq!(short, FitError::Parts { what: "field", expected: 240, found: 1 });
     let mut unknown = samples(field);
     unknown[7].noise = Noise::Unknown;
