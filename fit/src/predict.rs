@@ -89,14 +89,21 @@ pub fn predict(
     let expected = seen(&mut samples.iter().map(|sample| sample.value));
     let noise = Model::of(samples);
     let variance = |(sample, level): (&Sample, &f64)| noise.variance(sample.noise, *level);
-    let variances: Vec<f64> = samples.iter().zip(&expected).map(variance).collect();
+    let mut variances: Vec<f64> = samples.iter().zip(&expected).map(variance).collect();
 
     let mut sides = vec![expected];
     sides.extend(fields.iter().map(|field| seen(&mut field.iter().copied())));
-    let solution = solve(&design, &variances, &sides, &prior)?;
+    let mut solution = solve(&design, &variances, &sides, &prior)?;
     let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     if prior.is_none() && spectrum.rank() < basis.len() {
         return Err(undetermined::by_rank(samples, &basis));
+    }
+    let (common, jitters): (Vec<&Common>, Vec<&Common>) =
+        common.iter().partition(|common| common.shift.is_shared());
+    let moved = moved(&design, &solution.unknowns(1), &jitters)?;
+    if moved.iter().any(|variance| *variance > 0.0) {
+        variances.iter_mut().zip(&moved).for_each(|(variance, moved)| *variance += moved);
+        solution = solve(&design, &variances, &sides, &prior)?;
     }
     let coefficients: Vec<Vec<f64>> =
         (1..=sides.len()).map(|side| solution.unknowns(side)).collect();
@@ -107,15 +114,16 @@ pub fn predict(
         coefficients: coefficients[0].clone(),
         levels: sides.swap_remove(0),
         variances,
+        moved,
         excess: 0.0,
     };
-    let shifting: Vec<&Common> = common.iter().filter(|c| needs_a_side(c, &design)).collect();
+    let shifting: Vec<&Common> = common.iter().copied().filter(|c| needs_a_side(c, &design)).collect();
     let shifts = if shifting.is_empty() {
-        shifts(common, &settled.coefficients, &design, &solution)
+        shifts(&common, &settled.coefficients, &design, &solution)
     } else {
         let sides = sensitivities(&design, &settled, &shifting)?;
         let carried = solve(&design, &settled.variances, &sides, &prior)?;
-        shifts(common, &settled.coefficients, &design, &carried)
+        shifts(&common, &settled.coefficients, &design, &carried)
     };
     let factor = solution.inverse();
     let determined = prior.determined_by(&solution);

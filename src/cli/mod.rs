@@ -34,6 +34,7 @@ mod simulated;
 mod stopping;
 mod study;
 mod summary;
+mod target;
 mod text;
 
 use std::process::ExitCode;

@@ -1,59 +1,101 @@
-//! What the fit will make of a plan, asked before anything moves: whether the poses determine its
-//! coefficients at all. It knows nothing of levels or noise.
+//! What a plan is going to know on its rig, asked before anything moves: see
+//! [`crate::study::Forecast`]. Here are the words.
 
-use fit::{FitError, Noise, Sample};
+use serde_json::{Value, json};
 
-use super::results::fit_region;
 use super::setup::Setup;
-use crate::rig::forward;
+use super::text::{percent, table};
+use crate::rig::Quantity;
+use crate::study::{Budget, Forecast, ForecastError};
 
-/// Poses times coefficients squared that are looked at: a second's work.
-const WORK_MAX: f64 = 3e9;
-
-/// How well the plan's poses determine its fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Outlook {
-    pub(crate) coefficients: usize,
-    pub(crate) condition: f64,
-}
-
-/// Fits a sample of equal radiances along the plan's rays. `None` for a plan so large that asking
-/// would take long, and for one that leaves the basis to the readings.
-pub(crate) fn outlook(setup: &Setup) -> Option<Result<Outlook, FitError>> {
-    let model = setup.plan.fit.decided()?;
-    let targets = &setup.sequence.targets;
-    let coefficients = model.basis.len() as f64;
-    if targets.len() as f64 * coefficients * coefficients > WORK_MAX {
-        return None;
-    }
-    let noise = Noise::Fixed { variance: 1.0 };
-    let samples: Vec<Sample> = targets
-        .iter()
-        .map(|target| {
-            let pose = forward(target.positions);
-            let ray = fit::Ray {
-                x_m: pose.x_m,
-                y_m: pose.y_m,
-                theta_rad: pose.theta_rad,
-                phi_rad: pose.phi_rad,
-            };
-            Sample { ray, value: 1.0, noise }
-        })
-        .collect();
-    let fit = fit::fit(&samples, &fit_region(setup), model, &[]);
-    Some(
-        fit.map(|fit| Outlook {
-            coefficients: fit.coefficients().len(),
-            condition: fit.condition(),
-        }),
-    )
+/// Asks.
+pub(crate) fn outlook(setup: &Setup) -> Result<Forecast, ForecastError> {
+    Forecast::of(&setup.plan, &setup.rig, &setup.sequence)
 }
 
 /// A warning for a person about to spend rig time, if there is reason for one.
-pub(crate) fn warning(setup: &Setup) -> Option<String> {
-    let error = outlook(setup)?.err()?;
-    Some(format!(
-        "warning: these poses do not determine the plan's fit: {error}\n  help: take more of them, \
-         or lower the degrees in [fit]; the readings are as good as ever"
-    ))
+pub(crate) fn warning(outlook: &Result<Forecast, ForecastError>) -> Option<String> {
+    match outlook {
+        Err(ForecastError::Fit(error)) => Some(format!(
+            "warning: these poses do not determine the plan's fit: {error}\n  help: take more of \
+             them, or lower the degrees in [fit]; the readings are as good as ever"
+        )),
+        Ok(forecast) if forecast.saturates => Some(
+            "warning: the expected radiance fills the gain range: readings would be saturated\n  \
+             help: choose a higher range with dwell.gain, or correct [expect]"
+                .to_owned(),
+        ),
+        _ => None,
+    }
+}
+
+/// What the uncertainties hold for, and a table of them.
+pub(crate) fn text(forecast: &Forecast, quantity: Quantity) -> String {
+    let [unit, ..] = quantity.units();
+    let from = if forecast.prior.is_declared {
+        "[expect]"
+    } else {
+        "assumed: a tenth of the gain range; state it in [expect]"
+    };
+    let level = forecast.prior.level;
+    let mut said = format!("\n  predicted u, relative (k = 1), at {level:.4} {unit} ({from})\n");
+    let heads = ["", "all", "without scale", "independent", "truncation", "largest part"];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for (name, budget) in
+        [("exitance, flux", &forecast.of_exitance), ("radiance, RMS", &forecast.of_radiance)]
+    {
+        let (largest, u) = budget.largest(true);
+        rows.push(vec![
+            name.to_owned(),
+            percent(budget.u()),
+            percent(budget.u_without_scale()),
+            percent(budget.independent),
+            budget.truncation.map_or_else(|| "not asked".to_owned(), percent),
+            format!("{largest} {}", percent(u)),
+        ]);
+    }
+    rows.push(vec![
+        "radiance, worst".to_owned(),
+        percent(forecast.radiance_worst),
+        percent(forecast.radiance_worst_without_scale),
+    ]);
+    said.push_str(&table(&rows));
+    if forecast.of_radiance.truncation.is_none() {
+        said.push_str(
+            "  truncation: state expect.narrowest_feature_deg (or _mm) to have it predicted\n",
+        );
+    }
+    said
+}
+
+/// The same for programs.
+pub(crate) fn as_json(forecast: &Forecast, quantity: Quantity) -> Value {
+    let mut worst = budget(&forecast.of_radiance);
+    worst["worst_relative"] = json!(forecast.radiance_worst);
+    worst["worst_relative_without_scale"] = json!(forecast.radiance_worst_without_scale);
+    let mut exitance = budget(&forecast.of_exitance);
+    let mut flux = exitance.clone();
+    exitance["expected"] = json!(forecast.exitance);
+    flux["expected"] = json!(forecast.flux);
+    json!({
+        "level": {
+            "key": quantity.radiance_column(), "value": forecast.prior.level,
+            "stated_in_plan": forecast.prior.is_declared, "saturates": forecast.saturates,
+        },
+        quantity.exitance_key(): exitance,
+        quantity.flux_key(): flux,
+        "radiance": worst,
+    })
+}
+
+fn budget(budget: &Budget) -> Value {
+    let common: serde_json::Map<String, Value> =
+        budget.common.iter().map(|(name, u, _)| (name.clone(), json!(u))).collect();
+    json!({
+        "u_relative": budget.u(),
+        "u_relative_without_scale": budget.u_without_scale(),
+        "independent_relative": budget.independent,
+        "truncation_relative": budget.truncation,
+        "common_relative": common,
+    })
 }

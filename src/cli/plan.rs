@@ -6,29 +6,40 @@ use serde_json::json;
 
 use super::args::{EffectArgs, PlanArgs};
 use super::failure::Outcome;
-use super::outlook::{outlook, warning};
+use super::outlook::{self, outlook, warning};
 use super::output::{note, say, say_json};
 use super::setup::Setup;
+use super::target;
 use super::text::{duration, row, table};
 use crate::plan::Prediction;
 use crate::rig::AXES;
+use crate::study::{Forecast, ForecastError};
 
 /// Checks a plan and prints its prediction.
 pub(crate) fn plan(args: &PlanArgs) -> Outcome {
     let setup = Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?;
-    let prediction = &setup.sequence.prediction;
-    if args.json {
-        say_json(&as_json(&setup, prediction))?;
-    } else {
-        say(&as_text(&setup, prediction))?;
+    if !args.target.is_empty() {
+        return target::plan(args, &setup);
     }
-    if let Some(warning) = warning(&setup) {
+    target::check_unused(args)?;
+    let prediction = &setup.sequence.prediction;
+    let outlook = outlook(&setup);
+    if args.json {
+        say_json(&as_json(&setup, prediction, &outlook))?;
+    } else {
+        say(&as_text(&setup, prediction, &outlook))?;
+    }
+    if let Some(warning) = warning(&outlook) {
         note(&warning);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_text(setup: &Setup, prediction: &Prediction) -> String {
+fn as_text(
+    setup: &Setup,
+    prediction: &Prediction,
+    outlook: &Result<Forecast, ForecastError>,
+) -> String {
     let simulated = if setup.rig.is_simulated() { " (simulated)" } else { "" };
     let mut rows = vec![
         row("plan", format!("{} ({})", setup.plan_name, setup.plan_hash)),
@@ -43,7 +54,7 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
         rows.push(row(&format!("travel {}", axis.name()), axis.in_file_unit(travel)));
     }
     let parts = [
-        ("homing", prediction.homing_s),
+        ("homing, at most", prediction.homing_s),
         ("moving", prediction.moving_s),
         ("settling", prediction.settling_s),
         ("dwelling", prediction.dwelling_s),
@@ -51,14 +62,28 @@ fn as_text(setup: &Setup, prediction: &Prediction) -> String {
         ("rig time", prediction.total_s()),
     ];
     rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
-    if let Some(Ok(outlook)) = outlook(setup) {
-        let (count, condition) = (outlook.coefficients, outlook.condition);
+    if let Ok(forecast) = outlook {
+        let (count, condition) = (forecast.coefficients, forecast.condition);
         rows.push(row(
             "fit",
-            format!("{count} coefficients, all determined (condition {condition:.1})"),
+            match forecast.assumed_degree {
+                None => format!("{count} coefficients, all determined (condition {condition:.1})"),
+                Some(degree) => format!("chosen from the readings; here of degree {degree}"),
+            },
         ));
     }
-    table(&rows)
+    let mut text = table(&rows);
+    match outlook {
+        Ok(forecast) => {
+            text.push_str(&outlook::text(forecast, setup.rig.detector.quantity));
+        }
+        // The fit's own refusal is a warning of its own.
+        Err(ForecastError::Fit(_)) => {}
+        Err(error) => {
+            text.extend(["\n  no predicted uncertainty: ", &error.to_string(), "\n"]);
+        }
+    }
+    text
 }
 
 /// How many, how fast, and how far a window goes.
@@ -76,15 +101,22 @@ fn sweeps(setup: &Setup) -> Option<String> {
     ))
 }
 
-fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
-    let fit = match outlook(setup) {
-        Some(Ok(outlook)) => json!({
-            "determined": true, "coefficients": outlook.coefficients,
-            "condition": outlook.condition,
+fn as_json(
+    setup: &Setup,
+    prediction: &Prediction,
+    outlook: &Result<Forecast, ForecastError>,
+) -> serde_json::Value {
+    let fit = match outlook {
+        Ok(forecast) => json!({
+            "determined": true, "coefficients": forecast.coefficients,
+            "condition": forecast.condition, "assumed_degree": forecast.assumed_degree,
         }),
-        Some(Err(error)) => json!({"determined": false, "why": error.to_string()}),
-        None => serde_json::Value::Null,
+        Err(ForecastError::Fit(error)) => json!({"determined": false, "why": error.to_string()}),
+        Err(_) => serde_json::Value::Null,
     };
+    let uncertainty = outlook.as_ref().map_or(serde_json::Value::Null, |forecast| {
+        outlook::as_json(forecast, setup.rig.detector.quantity)
+    });
     let [theta, phi, x, y] = prediction.travel;
     json!({
         "plan": setup.plan_name,
@@ -102,6 +134,7 @@ fn as_json(setup: &Setup, prediction: &Prediction) -> serde_json::Value {
             "x_mm": x * 1e3, "y_mm": y * 1e3,
         },
         "fit": fit,
+        "uncertainty": uncertainty,
         "time_s": {
             "homing": prediction.homing_s,
             "moving": prediction.moving_s,

@@ -10,7 +10,8 @@ use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
-    Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted, WarmUp,
+    Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted,
+    WarmUp,
 };
 use crate::rig::Pose;
 
@@ -52,7 +53,7 @@ impl Plan {
     /// At the top: `name`, what to call its runs · `rig`, a rig file beside the plan or
     /// `"simulated"` · `scene`, a scene file beside the plan. Then the tables `[region]`,
     /// `[schedule]`, `[dwell]`, `[dark]`, `[fit]`, and if wanted `[sample]`, `[reference]`,
-    /// `[warm_up]` and `[stop]`, and any number of `[[derive]]`.
+    /// `[warm_up]`, `[stop]` and `[expect]`, and any number of `[[derive]]`.
     pub fn read(document: Document) -> Result<Self, Problem> {
         let root = document.root();
         let text = |key: &str| root.text(key).map(|text| text.map(str::to_owned));
@@ -66,6 +67,7 @@ impl Plan {
         let reference = read_reference(root.table("reference")?, &region, dwell)?;
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
+        let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
         let fit = root.table("fit")?.map(read_fit).transpose()?.unwrap_or_default();
         let derive = Wanted::read_all(&root)?;
         root.finish()?;
@@ -84,6 +86,7 @@ impl Plan {
             reference,
             warm_up,
             stop,
+            expect,
             fit,
             derive,
             document,

@@ -34,6 +34,7 @@ impl Plan {
     pub fn lay_out(&self, rig: &Rig, list: Option<&Source>) -> Result<Sequence, Problem> {
         let gain = self.gain_on(rig)?;
         self.check_dwells(rig)?;
+        self.check_expected(rig)?;
         let reference = self.reference_on(rig)?;
         if let Schedule::Sweep { .. } = self.schedule {
             return self.lay_out_sweeps(rig, gain, reference);

@@ -8,6 +8,9 @@
 mod cost;
 #[cfg(test)]
 mod example_tests;
+mod expect;
+#[cfg(test)]
+mod expect_tests;
 mod file;
 #[cfg(test)]
 mod file_tests;
@@ -18,6 +21,7 @@ mod layout;
 mod layout_tests;
 mod list;
 mod order;
+mod rewrite;
 mod sequence;
 mod sweep;
 #[cfg(test)]
@@ -27,7 +31,9 @@ mod tree;
 mod wanted;
 
 pub use cost::{Prediction, StepTime, TimeLeft};
+pub use expect::Expect;
 pub use hash::PlanHash;
+pub use rewrite::{Change, rewrite};
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};
 pub use terms::{Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, WarmUp};
 pub use wanted::{Asked, Wanted};

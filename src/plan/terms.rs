@@ -7,7 +7,7 @@ use std::time::Duration;
 use fit::{Outline, Wish};
 use spanned_toml::Document;
 
-use super::Wanted;
+use super::{Expect, Wanted};
 use crate::rig::Pose;
 
 /// A plan as its file states it.
@@ -41,6 +41,8 @@ pub struct Plan {
     pub warm_up: Option<WarmUp>,
     /// `[stop]`.
     pub stop: Stop,
+    /// `[expect]`.
+    pub expect: Expect,
     /// `[fit]`.
     pub fit: Wish,
     /// `[[derive]]`: what shall be derived from the fit.

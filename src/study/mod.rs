@@ -1,12 +1,22 @@
-//! Studies of many runs, the pure part: how good a fit is, which plans to compare, what accuracy
-//! costs in time, whether stated uncertainties hold. It is handed what runs found; it does not know
-//! rigs, clocks or files.
+//! Studies of plans and of many runs, the pure part: what a plan is going to know, how good a fit is,
+//! which plans to compare, what accuracy costs in time, whether stated uncertainties hold. It is
+//! handed what runs found; it does not know clocks or files.
 
 pub mod coverage;
+mod demand;
+mod forecast;
 mod frontier;
 mod ladder;
+mod parts;
+mod prior;
 mod score;
+mod search;
 
+pub use demand::{Demand, Shortfall};
+pub use forecast::{Forecast, ForecastError};
 pub use frontier::{Coverage, FrontierPoint, FrontierRow, coverage, doubling, points};
 pub use ladder::{LADDER, Rung};
+pub use parts::Budget;
+pub use prior::{Feature, Prior};
 pub use score::Score;
+pub use search::{Candidate, Considered, Found, Search, SearchError};

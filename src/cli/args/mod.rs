@@ -230,6 +230,16 @@ pub(crate) struct PlanArgs {
     pub(crate) plan: PathBuf,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    /// Look for the cheapest plan that reaches this: exitance=0.5%, flux=1%, radiance=2%
+    /// (relative standard uncertainty, k = 1; of the radiance RMS over the region). May be repeated.
+    #[arg(long, value_name = "QUANTITY=U")]
+    pub(crate) target: Vec<String>,
+    /// Targets are meant without the scale that is common to all readings.
+    #[arg(long)]
+    pub(crate) without_scale: bool,
+    /// Write the plan that was found; must not exist yet.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,0 +1,316 @@
+//! The cheapest plan that reaches an accuracy, among those that a person would try: the plan's own
+//! schedule denser or thinner, with its fit's degree or with one that goes with the density; sweeps
+//! instead of a grid where the plan says how narrow its features are; each with the shortest dwell
+//! that does.
+//!
+//! Every candidate is the plan's own text with some keys changed, read and laid out again: what is
+//! found is what is written.
+
+use std::time::Duration;
+
+use spanned_toml::{Document, Problem, Source};
+
+use super::{Demand, Forecast, ForecastError, Rung, Shortfall};
+use crate::plan::{Change, Plan, Schedule, rewrite};
+use crate::rig::Rig;
+
+/// Factors on the number of targets.
+const DENSITIES: [f64; 9] = [0.25, 0.354, 0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0];
+/// Dwells are searched up to this, milliseconds; and from this many ADC readings.
+const DWELL_MS_MAX: f64 = 1000.0;
+const READINGS_MIN: f64 = 2.0;
+/// A dwell that does not fit the rig (a sweep's, say) is tried longer or shorter by this factor.
+const DWELL_STEP: f64 = 4.0;
+/// How often a dwell is corrected after it was interpolated, and by how much.
+const CORRECTIONS: u32 = 4;
+const CORRECTION: f64 = 1.1;
+
+/// What a search starts from.
+#[derive(Clone, Copy)]
+pub struct Search<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// Its rig.
+    pub rig: &'a Rig,
+    /// Its list of poses, if it has one.
+    pub list: Option<&'a Source>,
+    /// What is asked.
+    pub demand: Demand,
+}
+
+/// What came of it.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The cheapest that reaches all targets.
+    pub best: Option<Candidate>,
+    /// All that were looked at closely, the plan itself first.
+    pub considered: Vec<Considered>,
+    /// How many were left out, since moving alone takes them longer than the best.
+    pub dearer: usize,
+    /// Where none reaches them: what the one that comes nearest still misses, with the longest
+    /// dwell.
+    pub floor: Option<Shortfall>,
+}
+
+/// A plan that was tried.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// What was done to the plan, in words.
+    pub what: String,
+    /// Its text.
+    pub text: String,
+    /// Its dwell, milliseconds.
+    pub dwell_ms: f64,
+    /// Its rig time, seconds.
+    pub time_s: f64,
+    /// What it is going to know.
+    pub forecast: Forecast,
+}
+
+/// A line of the table of what was considered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Considered {
+    /// What was done to the plan, in words.
+    pub what: String,
+    /// The dwell with which it stands here, milliseconds.
+    pub dwell_ms: f64,
+    /// Its rig time with that, seconds.
+    pub time_s: f64,
+    /// Relative u of the exitance, without truncation's sign; by the demand's word on the scale.
+    pub u_exitance: f64,
+    /// Relative u of the radiance.
+    pub u_radiance: f64,
+    /// Whether it reaches all targets.
+    pub meets: bool,
+}
+
+/// A way to change the plan, but for its dwell.
+struct Variant {
+    what: String,
+    changes: Vec<Change>,
+    /// The rig time with the shortest dwell, seconds.
+    least_s: f64,
+}
+
+impl Search<'_> {
+    /// Looks for it. The error is the plan's own: of its layout, or of its fit.
+    pub fn run(&self) -> Result<Found, SearchError> {
+        let itself = self.itself()?;
+        let meets = self.demand.ratio(&itself.forecast) <= 1.0;
+        let mut found = Found {
+            considered: vec![self.considered(&itself, meets)],
+            best: meets.then(|| itself.clone()),
+            dearer: 0,
+            floor: None,
+        };
+        let mut nearest = itself;
+        for variant in self.variants() {
+            if found.best.as_ref().is_some_and(|best| variant.least_s >= best.time_s) {
+                found.dearer += 1;
+                continue;
+            }
+            let Some((candidate, meets)) = self.shortest(&variant) else { continue };
+            found.considered.push(self.considered(&candidate, meets));
+            if meets {
+                if found.best.as_ref().is_none_or(|best| candidate.time_s < best.time_s) {
+                    found.best = Some(candidate);
+                }
+            } else if self.demand.ratio(&candidate.forecast) < self.demand.ratio(&nearest.forecast)
+            {
+                nearest = candidate;
+            }
+        }
+        if found.best.is_none() {
+            found.floor = self.demand.shortfall(&nearest.forecast);
+        }
+        Ok(found)
+    }
+
+    fn itself(&self) -> Result<Candidate, SearchError> {
+        let text = self.plan.document().source().text().to_owned();
+        let sequence = self.plan.lay_out(self.rig, self.list)?;
+        let forecast = Forecast::of(self.plan, self.rig, &sequence)?;
+        let (time_s, dwell_ms) = (sequence.prediction.total_s(), ms(self.plan.dwell));
+        Ok(Candidate { what: "the plan itself".to_owned(), text, dwell_ms, time_s, forecast })
+    }
+
+    /// The variants, the quickest first.
+    fn variants(&self) -> Vec<Variant> {
+        let mut variants = Vec::new();
+        for density in DENSITIES {
+            let plan = Rung { density, dwell: 1.0 }.apply(self.plan);
+            let mut degrees = vec![self.plan.fit.angular_degree, plan.fit.angular_degree];
+            degrees.dedup();
+            for degree in degrees {
+                let mut changes = spacing(&plan.schedule);
+                let mut what = format!("density {density}");
+                if let Some(degree) = degree {
+                    what = format!("{what}, degree {degree}");
+                    if Some(degree) != self.plan.fit.angular_degree {
+                        changes.push(Change::set("fit", "angular_degree", degree));
+                    }
+                }
+                variants.push((what.clone(), changes.clone()));
+                if let Some(sweep) = self.as_sweep(&plan.schedule) {
+                    changes.retain(|change| change.table != "schedule");
+                    changes.extend(sweep);
+                    variants.push((format!("sweeps, {what}"), changes));
+                }
+            }
+            if self.plan.list_file().is_some() {
+                break;
+            }
+        }
+        let mut variants: Vec<Variant> = variants
+            .into_iter()
+            .filter_map(|(what, changes)| {
+                let (plan, _) = self.with(&changes, self.dwell_ms_min())?;
+                let sequence = plan.lay_out(self.rig, self.list).ok();
+                // Windows this short may be more than the wire carries: no reason to leave it out.
+                let least_s = sequence.map_or(0.0, |s| s.prediction.total_s());
+                Some(Variant { what, changes, least_s })
+            })
+            .collect();
+        variants.sort_by(|a, b| a.least_s.total_cmp(&b.least_s));
+        variants
+    }
+
+    /// Sweeps along meridians instead of a grid of directions.
+    fn as_sweep(&self, schedule: &Schedule) -> Option<Vec<Change>> {
+        let narrowest = self.plan.expect.narrowest_feature_rad?.to_degrees();
+        let step = match *schedule {
+            Schedule::CGamma { c_step_deg, .. } => c_step_deg,
+            Schedule::Raster { phi_step_deg, .. } => phi_step_deg,
+            _ => return None,
+        };
+        let gone = ["theta_step_deg", "gamma_step_deg", "c_step_deg", "order"];
+        let mut changes: Vec<Change> =
+            gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
+        changes.push(Change::set("schedule", "kind", "\"sweep\""));
+        changes.push(Change::set("schedule", "phi_step_deg", step));
+        changes.push(Change::set("schedule", "narrowest_deg", narrowest));
+        Some(changes)
+    }
+
+    /// The variant with the shortest dwell that reaches all targets, or with the longest if none
+    /// does, and whether it does.
+    fn shortest(&self, variant: &Variant) -> Option<(Candidate, bool)> {
+        let ratio = |candidate: &Candidate| self.demand.ratio(&candidate.forecast);
+        let low = self.nearest_to(variant, self.dwell_ms_min(), DWELL_STEP)?;
+        if ratio(&low) <= 1.0 {
+            return Some((low, true));
+        }
+        let high = self.nearest_to(variant, DWELL_MS_MAX, 1.0 / DWELL_STEP)?;
+        if ratio(&high) > 1.0 {
+            return Some((high, false));
+        }
+        // u² is a constant and a part that falls as one over the dwell.
+        let (from, to) = (1.0 / low.dwell_ms, 1.0 / high.dwell_ms);
+        let slope = (ratio(&low).powi(2) - ratio(&high).powi(2)) / (from - to);
+        let constant = ratio(&high).powi(2) - slope * to;
+        let mut dwell_ms = (slope / (1.0 - constant)).clamp(low.dwell_ms, high.dwell_ms);
+        for _ in 0..CORRECTIONS {
+            match self.candidate(variant, dwell_ms) {
+                Some(candidate) if ratio(&candidate) <= 1.0 => return Some((candidate, true)),
+                _ => dwell_ms *= CORRECTION,
+            }
+        }
+        Some((high, true))
+    }
+
+    /// The variant with a dwell as near to this as the rig can.
+    fn nearest_to(&self, variant: &Variant, mut dwell_ms: f64, step: f64) -> Option<Candidate> {
+        while (self.dwell_ms_min()..=DWELL_MS_MAX).contains(&dwell_ms) {
+            if let Some(candidate) = self.candidate(variant, dwell_ms) {
+                return Some(candidate);
+            }
+            dwell_ms *= step;
+        }
+        None
+    }
+
+    fn candidate(&self, variant: &Variant, dwell_ms: f64) -> Option<Candidate> {
+        let (plan, text) = self.with(&variant.changes, dwell_ms)?;
+        let sequence = plan.lay_out(self.rig, self.list).ok()?;
+        let forecast = Forecast::of(&plan, self.rig, &sequence).ok()?;
+        let (time_s, dwell_ms) = (sequence.prediction.total_s(), ms(plan.dwell));
+        let in_time = plan.stop.rig_time_max.is_none_or(|most| time_s <= most.as_secs_f64());
+        in_time.then(|| Candidate { what: variant.what.clone(), text, dwell_ms, time_s, forecast })
+    }
+
+    /// The plan with these changes and this dwell, if its text can be changed so.
+    fn with(&self, changes: &[Change], dwell_ms: f64) -> Option<(Plan, String)> {
+        let source = self.plan.document().source();
+        let mut changes = changes.to_vec();
+        let dwell_ms = rounded_up(dwell_ms);
+        changes.push(Change::set("dwell", "dwell_ms", dwell_ms));
+        changes.push(Change::remove("schedule", "window_ms"));
+        let text = rewrite(source.text(), &changes);
+        let document = Document::parse(Source::new(source.name(), &text)).ok()?;
+        let plan = Plan::read(document).ok()?;
+        // A text that could not be changed is read as it was.
+        ((ms(plan.dwell) - dwell_ms).abs() < 1e-3 + 1e-6 * dwell_ms).then_some((plan, text))
+    }
+
+    fn dwell_ms_min(&self) -> f64 {
+        READINGS_MIN * 1e3 / f64::from(self.rig.detector.adc.rate_hz)
+    }
+
+    fn considered(&self, candidate: &Candidate, meets: bool) -> Considered {
+        let Forecast { of_exitance, of_radiance, .. } = &candidate.forecast;
+        let u = |budget: &super::Budget| {
+            if self.demand.without_scale { budget.u_without_scale() } else { budget.u() }
+        };
+        Considered {
+            what: candidate.what.clone(),
+            dwell_ms: candidate.dwell_ms,
+            time_s: candidate.time_s,
+            u_exitance: u(of_exitance),
+            u_radiance: u(of_radiance),
+            meets,
+        }
+    }
+}
+
+/// Why there is nothing to search from.
+#[derive(Debug, thiserror::Error)]
+pub enum SearchError {
+    /// The plan can't be laid out.
+    #[error(transparent)]
+    Plan(#[from] Problem),
+    /// Nothing can be foretold of it.
+    #[error(transparent)]
+    Forecast(#[from] ForecastError),
+}
+
+/// The keys that say how dense a schedule is.
+fn spacing(schedule: &Schedule) -> Vec<Change> {
+    let set = |key: &'static str, value: f64| Change::set("schedule", key, value);
+    match *schedule {
+        Schedule::CGamma { c_step_deg, gamma_step_deg, .. } => {
+            vec![set("c_step_deg", c_step_deg), set("gamma_step_deg", gamma_step_deg)]
+        }
+        Schedule::Raster { theta_step_deg, phi_step_deg, .. } => {
+            vec![set("theta_step_deg", theta_step_deg), set("phi_step_deg", phi_step_deg)]
+        }
+        Schedule::LowDiscrepancy { count } => vec![Change::set("schedule", "count", count)],
+        Schedule::Sweep { phi_step_deg, speed_deg_per_s, narrowest_deg, .. } => {
+            let mut changes = vec![set("phi_step_deg", phi_step_deg)];
+            changes.extend(speed_deg_per_s.map(|speed| set("speed_deg_per_s", speed)));
+            changes.extend(narrowest_deg.map(|narrowest| set("narrowest_deg", narrowest)));
+            changes
+        }
+        Schedule::List { .. } => Vec::new(),
+    }
+}
+
+fn ms(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+/// To three digits, which a person reads; to whole microseconds at least.
+fn rounded_up(dwell_ms: f64) -> f64 {
+    let decimals = 2.0 - libm::floor(libm::log10(dwell_ms));
+    let factor = libm::pow(10.0, decimals.clamp(0.0, 3.0));
+    libm::ceil(dwell_ms * factor - 1e-6) / factor
+}

@@ -1,0 +1,117 @@
+//! What `gonio plan` says beforehand, over the whole program: uncertainty and time against a run's,
+//! and plans found for a target. Would break: a prediction that takes noise or scale from elsewhere
+//! than calibration does, a search that writes what it did not look at, an impossible target that
+//! ends well. The long version is the program `predictions` of the crate benches.
+
+mod bench;
+
+use bench::Bench;
+use serde_json::Value;
+
+fn number(said: &Value, pointer: &str) -> f64 {
+    said.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {said}"))
+}
+
+/// The small lambertian example, which says what it expects.
+fn expecting() -> Bench {
+    Bench::small().with("plan.toml", "[fit]", "[expect]\nradiance_w_per_m2_sr = 50\n\n[fit]")
+}
+
+/// The same, its scale known but for the gain, and noise that shows.
+fn noisy() -> Bench {
+    expecting()
+        .with("rig.toml", "u_responsivity_relative = 0.005", "u_responsivity_relative = 0")
+        .with("rig.toml", "u_distance_mm = 0.3", "u_distance_mm = 0")
+        .with("rig.toml", "u_pupil_diameter_mm = 0.01", "u_pupil_diameter_mm = 0")
+        .with("rig.toml", "u_spot_diameter_mm = 0.01", "u_spot_diameter_mm = 0")
+        .with("rig.toml", "read_noise_a = 2e-13", "read_noise_a = 2e-8")
+}
+
+#[test]
+fn a_run_is_as_accurate_as_its_plan_said() {
+    for (bench, is_noisy) in [(expecting(), false), (noisy(), true)] {
+        let plan = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+        let run = bench.gonio(&["run", "plan.toml", "--out", "run", "--json"]).well().json();
+        let exitance = |key: &str| number(&plan, &format!("/uncertainty/exitance_w_per_m2/{key}"));
+        let value = number(&run, "/exitance_w_per_m2/value");
+        let stated = number(&run, "/exitance_w_per_m2/u") / value;
+        let factor = stated / exitance("u_relative");
+        assert!((1.0 / 1.3..1.3).contains(&factor), "{factor} of {stated}");
+        if is_noisy {
+            // Elsewhere it is a part in a million, and rounding's.
+            let stated = number(&run, "/exitance_w_per_m2/u_independent") / value;
+            let factor = stated / exitance("independent_relative");
+            assert!((1.0 / 1.3..1.3).contains(&factor), "{factor} of {stated}");
+        }
+        assert!(exitance("u_relative_without_scale") < exitance("u_relative"));
+        let flux = number(&plan, "/uncertainty/flux_w/u_relative");
+        assert!((flux / exitance("u_relative") - 1.0).abs() < 1e-12);
+        let radiance = |key: &str| number(&plan, &format!("/uncertainty/radiance/{key}"));
+        assert!(radiance("worst_relative") >= radiance("u_relative"));
+    }
+}
+
+#[test]
+fn an_assumed_level_says_so() {
+    let bench = Bench::small();
+    let said = bench.gonio(&["plan", "plan.toml"]).well();
+    assert!(said.out.contains("assumed: a tenth of the gain range"), "{said}");
+    assert!(said.out.contains("state expect.narrowest_feature_deg"), "{said}");
+    let json = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    assert_eq!(json["uncertainty"]["level"]["stated_in_plan"], false, "{said}");
+    assert_eq!(json["uncertainty"]["radiance"]["truncation_relative"], Value::Null);
+}
+
+#[test]
+fn the_plan_that_is_found_reaches_its_target_in_less_time() {
+    let bench = noisy();
+    let itself = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    let u = number(&itself, "/uncertainty/exitance_w_per_m2/u_relative");
+    let target = format!("exitance={}%", 100.0 * 1.5 * u);
+    let words = ["plan", "plan.toml", "--target", &target, "-o", "found.toml"];
+    let said = bench.gonio(&words).well();
+    for part in ["considered", "cheapest:", "written to found.toml"] {
+        assert!(said.out.contains(part), "{said}");
+    }
+    let found = bench.gonio(&["plan", "found.toml", "--json"]).well().json();
+    assert!(number(&found, "/uncertainty/exitance_w_per_m2/u_relative") <= 1.5 * u);
+    assert!(number(&found, "/time_s/total") < number(&itself, "/time_s/total"));
+    // Comments and keys that have nothing to do with it are kept.
+    let (before, after) = (bench.text("plan.toml"), bench.text("found.toml"));
+    assert_eq!(before.lines().next(), after.lines().next());
+    assert!(after.contains("[reference]") && after.contains("method = \"shutter\""), "{after}");
+    let again = bench.gonio(&words);
+    again.refused(&["found.toml: exists already; nothing is overwritten"]);
+}
+
+#[test]
+fn what_no_plan_reaches_is_said_with_its_floor() {
+    let bench = expecting();
+    let words = ["plan", "plan.toml", "--target", "exitance=0.01%", "-o", "found.toml", "--json"];
+    let said = bench.gonio(&words);
+    assert_eq!(said.code, Some(1), "{said}");
+    let json = said.json();
+    assert_eq!(json["best"], Value::Null);
+    assert_eq!(json["floor"]["largest"], "responsivity");
+    assert!((number(&json, "/floor/largest_relative") - 0.005).abs() < 1e-6, "{json}");
+    assert!(said.err.contains("no plan within the limits reaches exitance"), "{said}");
+    assert!(said.err.contains("--without-scale"), "{said}");
+    assert!(!bench.path("found.toml").exists());
+}
+
+#[test]
+fn targets_that_are_none_are_refused() {
+    let bench = Bench::small();
+    for (target, part) in [
+        ("exitance", "expected QUANTITY=U"),
+        ("power=1%", "expected exitance, flux or radiance"),
+        ("exitance=0", "expected more than 0"),
+        ("radiance=soon", "expected a number"),
+    ] {
+        let said = bench.gonio(&["plan", "plan.toml", "--target", target]);
+        said.refused(&[target, part, "help: write for example"]);
+    }
+    let twice = ["plan", "plan.toml", "--target", "flux=1%", "--target", "flux=2%"];
+    bench.gonio(&twice).refused(&["another target for the same quantity"]);
+    bench.gonio(&["plan", "plan.toml", "-o", "x.toml"]).refused(&["--output", "add --target"]);
+}
