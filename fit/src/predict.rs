@@ -11,6 +11,7 @@ use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::solve::{left_over, needs_a_side, sensitivities, shifts, solve};
+use crate::triangle::Solution;
 use crate::weights::{Model, Settled, moved};
 use crate::{Common, FitError, Noise, Ray, Region, Sample, undetermined};
 
@@ -117,14 +118,7 @@ pub fn predict(
         moved,
         excess: 0.0,
     };
-    let shifting: Vec<&Common> = common.iter().copied().filter(|c| needs_a_side(c, &design)).collect();
-    let shifts = if shifting.is_empty() {
-        shifts(&common, &settled.coefficients, &design, &solution)
-    } else {
-        let sides = sensitivities(&design, &settled, &shifting)?;
-        let carried = solve(&design, &settled.variances, &sides, &prior)?;
-        shifts(&common, &settled.coefficients, &design, &carried)
-    };
+    let shifts = carried(&common, &design, &settled, &solution, &prior)?;
     let factor = solution.inverse();
     let determined = prior.determined_by(&solution);
     let dof = left_over(samples.len(), determined);
@@ -154,6 +148,24 @@ pub fn predict(
         fields: fields.collect::<Result<_, FitError>>()?,
         fit: fit(expected, shifts, quality)?,
     })
+}
+
+/// The coefficients' shift by one u of each component.
+fn carried(
+    common: &[&Common],
+    design: &Design<'_>,
+    settled: &Settled,
+    solution: &Solution,
+    prior: &Prior,
+) -> Result<Vec<CommonShift>, FitError> {
+    let shifting: Vec<&Common> =
+        common.iter().copied().filter(|c| needs_a_side(c, design)).collect();
+    if shifting.is_empty() {
+        return Ok(shifts(common, &settled.coefficients, design, solution));
+    }
+    let sides = sensitivities(design, settled, &shifting)?;
+    let carried = solve(design, &settled.variances, &sides, prior)?;
+    Ok(shifts(common, &settled.coefficients, design, &carried))
 }
 
 fn check_fields(samples: &[Sample], fields: &[Vec<f64>]) -> Result<(), FitError> {
