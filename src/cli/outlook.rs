@@ -16,10 +16,7 @@ pub(crate) fn outlook(setup: &Setup) -> Result<Forecast, ForecastError> {
 /// A warning for a person about to spend rig time, if there is reason for one.
 pub(crate) fn warning(outlook: &Result<Forecast, ForecastError>) -> Option<String> {
     match outlook {
-        Err(ForecastError::Fit(error)) => Some(format!(
-            "warning: these poses do not determine the plan's fit: {error}\n  help: take more of \
-             them, or lower the degrees in [fit]; the readings are as good as ever"
-        )),
+        Err(ForecastError::Fit(error)) => Some(undetermined(error)),
         Ok(forecast) if forecast.saturates => Some(
             "warning: the expected radiance fills the gain range: readings would be saturated\n  \
              help: choose a higher range with dwell.gain, or correct [expect]"
@@ -27,6 +24,18 @@ pub(crate) fn warning(outlook: &Result<Forecast, ForecastError>) -> Option<Strin
         ),
         _ => None,
     }
+}
+
+/// The same for who is about to run the plan: whether its fit will be refused, and no more.
+pub(crate) fn refusal(setup: &Setup) -> Option<String> {
+    Forecast::refusal(&setup.plan, &setup.rig, &setup.sequence).map(|error| undetermined(&error))
+}
+
+fn undetermined(error: &fit::FitError) -> String {
+    format!(
+        "warning: these poses do not determine the plan's fit: {error}\n  help: take more of them, \
+         or lower the degrees in [fit]; the readings are as good as ever"
+    )
 }
 
 /// What the uncertainties hold for, and a table of them.

@@ -7,7 +7,7 @@ use super::acquire::{Acquired, Pace, acquire, exit_code};
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{create, default_folder, exists_already};
-use super::outlook::{outlook, warning};
+use super::outlook::refusal;
 use super::output::{note, say, say_json};
 use super::report::RunRecord;
 use super::results::{Results, targets_planned};
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
     if folder.exists() {
         return Err(exists_already(&folder));
     }
-    if let Some(warning) = warning(&outlook(&setup)) {
+    if let Some(warning) = refusal(&setup) {
         note(&warning);
     }
     let pace = Pace::of(&setup, args.realtime);

@@ -88,6 +88,18 @@ impl Forecast {
         Err(last.unwrap_or(ForecastError::Fit(FitError::Empty)))
     }
 
+    /// Why the plan's fit will be refused, if it will: a part of the work, for who is about to run it.
+    pub fn refusal(plan: &Plan, rig: &Rig, sequence: &Sequence) -> Option<FitError> {
+        let model = plan.fit.decided()?;
+        let prior = Prior::of(plan, rig, sequence.steps.first().map_or(0, |step| step.gain));
+        let samples = expected(rig, &prior, &sequence.steps).ok()?.fit_input().samples;
+        let work = samples.len() as f64 * (model.basis.len() as f64).powi(2);
+        if work > WORK_MAX {
+            return None;
+        }
+        fit::predict(&samples, &[], &region(plan), model, &[], None, &[]).err()
+    }
+
     fn in_model(
         plan: &Plan,
         rig: &Rig,
