@@ -6,8 +6,9 @@ use std::time::Duration;
 use crate::golden;
 use crate::pair::{self, Dice, Faults, Ledger, Pair};
 use firmware_protocol::{
-    Cause, CommandId, Decoder, Event, HostEvent, Instant, LinkCause, MoveTo, Nonsense, Rejection,
-    Reply, Request, RequestType, Said, SessionTag, SubmitError, Ticket, ToDevice, ToHost, frame,
+    Cause, CommandId, Decoder, Event, HostEvent, Instant, LinkCause, MoveTo, Nonsense, PROTOCOL,
+    Rejection, Reply, Request, RequestType, Said, SessionTag, SubmitError, Ticket, ToDevice,
+    ToHost, frame,
 };
 
 const BOOT: u32 = golden::BOOT;
@@ -412,7 +413,7 @@ fn a_newer_device_is_named_with_both_versions() {
     pair.down.faults.drop = 1.0;
     pair.host.identify(pair.now);
     pair.up.send(pair.now, &golden::bytes("foreign-identity"));
-    let expected = HostEvent::VersionMismatch { device: (2, Some(7)), host: (1, 0) };
+    let expected = HostEvent::VersionMismatch { device: (2, Some(7)), host: PROTOCOL };
     assert_eq!(pair.next_event(), Some(expected));
     assert_eq!(pair.host.submit(pair.now, Request::KeepAlive), Err(SubmitError::NoSession));
 }

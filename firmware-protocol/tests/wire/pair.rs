@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use firmware_protocol::{
-    AxisMask, Board, CommandId, Device, DeviceEndpoint, Done, Event, HostEndpoint, Identity,
-    Instant, Reply, Request, Status, frame,
+    AxisMask, Board, Capabilities, CommandId, Device, DeviceEndpoint, Done, Event, HostEndpoint,
+    Identity, Instant, Rejection, Reply, Request, Status, frame,
 };
 
 use crate::golden;
@@ -172,6 +172,9 @@ impl Ledger {
             Request::ClearFault => Reply::Cleared,
             Request::KeepAlive => Reply::Alive,
             Request::Acknowledge(id) => Reply::Acknowledged(*id),
+            // It keeps no windows.
+            Request::Capabilities => Reply::Capabilities(Capabilities { windows: 0 }),
+            Request::FetchWindow(id, _) => Reply::Rejected(*id, Rejection::NoSuchWindow),
             command => self.accept(now, command.command().expect("all others are commands")),
         }
     }
