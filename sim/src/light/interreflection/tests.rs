@@ -49,7 +49,7 @@ const WALL: &str = "corners_mm = [[0, 0, 0], [0, 80, 0], [0, 80, 60], [0, 0, 60]
 #[test]
 fn form_factors_are_those_of_the_closed_forms_both_ways() {
     let corner = scene(&format!("{}{}{FAR_LAMP}", surface(0.5, FLOOR), surface(0.5, WALL)));
-    let found = exchange(&corner, 1e-2);
+    let found = exchange(&corner, 1e-3);
     let expected = perpendicular_rectangles(0.1, 0.06, 0.08).unwrap().ratio();
     let back = expected * 0.08 * 0.1 / (0.08 * 0.06);
     let both = (factor(&found, 0, 1), factor(&found, 1, 0));
