@@ -5,8 +5,8 @@
 //! A block B is taken in by factoring [R; B] and keeping the new R (Golub & Van Loan 2013, Matrix
 //! Computations, §6.5.3 and §5.2.2; Demmel et al. 2012, "Communication-optimal parallel and
 //! sequential QR and LU", for the tree of such steps). The first blocks are taken in by reflections
-//! ([`reflect`]). Once R is a measure of what comes, a block is taken in by the normal equations of
-//! B R⁻¹ ([`gram`]), in about half the time; that those are well conditioned is checked for every
+//! (`reflect`). Once R is a measure of what comes, a block is taken in by the normal equations of
+//! B R⁻¹ (`gram`), in about half the time; that those are well conditioned is checked for every
 //! block, and reflections do what fails the check. The order in which rows come changes R by
 //! rounding alone.
 //!
