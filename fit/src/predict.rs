@@ -4,13 +4,12 @@
 //!
 //! How far the basis follows other fields is asked along with it, as further right-hand sides.
 
-use crate::basis::{Basis, dot};
+use crate::basis::dot;
 use crate::beam::Optics;
 use crate::beam::design::Design;
-use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
-use crate::solve::{left_over, needs_a_side, sensitivities, shifts, solve};
+use crate::solve::{left_over, needs_a_side, ready, sensitivities, shifts, solve};
 use crate::triangle::Solution;
 use crate::weights::{Model, Settled, moved};
 use crate::{Common, FitError, Noise, Ray, Region, Sample, undetermined};
@@ -73,15 +72,8 @@ pub fn predict(
     fields: &[Vec<f64>],
 ) -> Result<Predicted, FitError> {
     let model = model.into();
-    check(samples, region, model, common)?;
+    let (basis, prior) = ready(samples, region, model, common)?;
     check_fields(samples, fields)?;
-    let basis = Basis::new(model.basis, *region)?;
-    let prior = Prior::new(&basis, model.penalty)?;
-    if prior.is_none()
-        && let Some(refusal) = undetermined::by_count(samples, &basis)
-    {
-        return Err(refusal);
-    }
     let design = Design::new(samples, &basis, optics)?.in_flight(flown);
     let on_sample = on_sample(&design);
     let seen = |along: &mut dyn Iterator<Item = f64>| -> Vec<f64> {

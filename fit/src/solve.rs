@@ -81,14 +81,7 @@ pub fn fit_flown(
     optics: Option<&Optics>,
 ) -> Result<Fit, FitError> {
     let model = model.into();
-    check(samples, region, model, common)?;
-    let basis = Basis::new(model.basis, *region)?;
-    let prior = Prior::new(&basis, model.penalty)?;
-    if prior.is_none()
-        && let Some(refusal) = undetermined::by_count(samples, &basis)
-    {
-        return Err(refusal);
-    }
+    let (basis, prior) = ready(samples, region, model, common)?;
     let design = Design::new(samples, &basis, optics)?.in_flight(flown);
     let (common, jitters): (Vec<&Common>, Vec<&Common>) =
         common.iter().partition(|common| common.shift.is_shared());
@@ -109,6 +102,21 @@ pub fn fit_flown(
         .map_err(|_| FitError::OutOfRange)
 }
 
+/// The basis and what is held against rough fields, for samples that can be fitted: sound ones, and
+/// as many as the basis needs where nothing else determines it.
+pub(crate) fn ready(
+    samples: &[Sample],
+    region: &Region,
+    model: Penalised,
+    common: &[Common],
+) -> Result<(Basis, Prior), FitError> {
+    check(samples, region, model, common)?;
+    let basis = Basis::new(model.basis, *region)?;
+    let prior = Prior::new(&basis, model.penalty)?;
+    let refusal = if prior.is_none() { undetermined::by_count(samples, &basis) } else { None };
+    refusal.map_or(Ok((basis, prior)), Err)
+}
+
 /// The triangle of samples weighted by what their own fit says, every common component a side of its
 /// own, without the penalty; and their variances.
 pub(crate) fn weighted(
@@ -118,14 +126,7 @@ pub(crate) fn weighted(
     common: &[Common],
     optics: Option<&Optics>,
 ) -> Result<(Triangle, Vec<f64>), FitError> {
-    check(samples, region, model, common)?;
-    let basis = Basis::new(model.basis, *region)?;
-    let prior = Prior::new(&basis, model.penalty)?;
-    if prior.is_none()
-        && let Some(refusal) = undetermined::by_count(samples, &basis)
-    {
-        return Err(refusal);
-    }
+    let (basis, prior) = ready(samples, region, model, common)?;
     let design = Design::new(samples, &basis, optics)?;
     let (common, jitters): (Vec<&Common>, Vec<&Common>) =
         common.iter().partition(|common| common.shift.is_shared());
