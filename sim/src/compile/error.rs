@@ -82,10 +82,11 @@ impl fmt::Display for CompileError {
             }
             Self::UnknownEffect { name, nearest, known } => {
                 write!(f, "no effect is called {name}")?;
-                if let Some(nearest) = nearest {
-                    write!(f, "; did you mean {nearest}?")?;
+                match nearest {
+                    Some(nearest) => write!(f, "; did you mean {nearest}?")?,
+                    None => f.write_str(";")?,
                 }
-                write!(f, " The effects here: {}", known.join(", "))
+                write!(f, " the effects here: {}", known.join(", "))
             }
             Self::Unsupported(what) => write!(f, "not simulated: {what}"),
         }
