@@ -1,6 +1,5 @@
 //! What is refused before a fit is tried: numbers that make no sense, by sample and by name.
 
-use crate::sample::HORIZON_RAD;
 use crate::weights::has_unknown;
 use crate::{Common, FitError, Noise, Penalised, Region, Sample};
 
@@ -49,7 +48,7 @@ pub(crate) fn check_sample(index: usize, sample: &Sample, region: &Region) -> Re
         return Err(FitError::NotFinite { index, what });
     }
     check_noise(index, sample.noise)?;
-    if !(0.0..=HORIZON_RAD).contains(&ray.theta_rad) {
+    if !(0.0..=region.chart.theta_end_rad()).contains(&ray.theta_rad) {
         return Err(FitError::Theta { index, theta_rad: ray.theta_rad });
     }
     if !region.holds(ray) {

@@ -62,7 +62,7 @@ impl Fit {
     /// let at = |i: u32| ray(f64::from(i % 8) * 0.2, f64::from(i / 8) * 2.1);
     /// let samples: Vec<Sample> =
     ///     (0..24).map(|i| Sample { ray: at(i), value: 100.0, noise }).collect();
-    /// let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+    /// let region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
     /// let basis = BasisSpec::zernike(2, 0);
     /// let common = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
     /// let field = fit::fit(&samples, &region, basis, &[common])?;

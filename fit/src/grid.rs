@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::Noise;
 
-    const REGION: Region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+    const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
 
     fn sample(theta_deg: f64, phi_deg: f64) -> Sample {
         let (theta_rad, phi_rad) = (theta_deg.to_radians(), phi_deg.to_radians());

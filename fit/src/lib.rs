@@ -30,7 +30,7 @@
 //! let noise = Noise::Fixed { variance: 0.01 };
 //! let samples: Vec<Sample> =
 //!     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
-//! let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+//! let region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
 //! let basis = BasisSpec::zernike(2, 0);
 //! let responsivity = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
 //!
@@ -45,6 +45,7 @@
 pub use basis::{Angular, BasisSpec, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
+pub use chart::{Chart, Face};
 pub use choice::{AngularKind, Candidate, Choice, SweepKind, Wish, choose};
 pub use error::FitError;
 pub use fitted::{CommonShift, Contribution, Estimate, Fit, Parts, Quality};
@@ -61,6 +62,7 @@ pub use undetermined::Cause;
 
 mod basis;
 mod beam;
+mod chart;
 mod check;
 mod choice;
 pub mod derive;

@@ -1,14 +1,18 @@
 //! What goes into a fit: rays, the values seen along them, and the region that they stand for.
 //! Knows nothing of rigs, counts or files.
 
-/// A ray in the surface chart: where it leaves the sample and in which direction.
+use crate::{Chart, Face};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+/// A ray by its place and its direction: in the surface chart where it leaves the sample, in others
+/// what [`Chart`] says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where the ray leaves the sample, metres.
+    /// Its place, metres.
     pub x_m: f64,
-    /// Where the ray leaves the sample, metres.
+    /// Its place, metres.
     pub y_m: f64,
-    /// From the sample's normal, radians, in [0, π/2].
+    /// From the sample's normal +z, radians, in [0, π/2], or over the whole sphere to π.
     pub theta_rad: f64,
     /// From +x towards +y, radians, any turn.
     pub phi_rad: f64,
@@ -47,30 +51,83 @@ pub enum Noise {
     Unknown,
 }
 
-/// What the fit stands for: a rectangle on the sample, and the cone that was to be measured.
+/// What the fit stands for: a rectangle of places, and the cone that was to be measured. There is
+/// a constructor for each chart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
     /// From and to, metres. Equal ends stand for a single position.
     pub x_m: (f64, f64),
     /// From and to, metres. Equal ends stand for a single position.
     pub y_m: (f64, f64),
-    /// The cone's half angle, radians, in (0, π/2].
+    /// The cone's half angle about +z, radians, in (0, π/2], over the whole sphere to π. Between two
+    /// planes the largest angle that both rectangles allow for.
     pub theta_max_rad: f64,
+    /// In which coordinates all this is.
+    pub chart: Chart,
 }
 
 impl Region {
-    /// The rectangle's area, m².
-    pub fn area_m2(&self) -> f64 {
-        (self.x_m.1 - self.x_m.0) * (self.y_m.1 - self.y_m.0)
+    /// A rectangle on a flat sample, and the cone about its normal.
+    pub const fn surface(x_m: (f64, f64), y_m: (f64, f64), theta_max_rad: f64) -> Self {
+        Self { x_m, y_m, theta_max_rad, chart: Chart::Surface }
     }
 
-    /// Whether the ends are finite and in order, and the cone within the hemisphere.
+    /// An object that lies within a sphere about the origin, seen to an angle from +z: π for all
+    /// sides. Beyond the sphere nothing shines.
+    ///
+    /// ```
+    /// let ball = fit::Region::object(0.1, std::f64::consts::PI);
+    /// assert!((ball.area_m2() - std::f64::consts::PI * 0.01).abs() < 1e-15);
+    /// ```
+    pub const fn object(radius_m: f64, theta_max_rad: f64) -> Self {
+        let side = (-radius_m, radius_m);
+        let chart = Chart::Perpendicular { face: Face::Disk };
+        Self { x_m: side, y_m: side, theta_max_rad, chart }
+    }
+
+    /// A rectangle of the plane across each direction, its sides along growing θ and φ.
+    pub const fn perpendicular(x_m: (f64, f64), y_m: (f64, f64), theta_max_rad: f64) -> Self {
+        Self { x_m, y_m, theta_max_rad, chart: Chart::Perpendicular { face: Face::Rectangle } }
+    }
+
+    /// What arrives at a point, to an angle from +z: π for all sides.
+    pub const fn environment(theta_max_rad: f64) -> Self {
+        let point = (0.0, 0.0);
+        Self { x_m: point, y_m: point, theta_max_rad, chart: Chart::Environment }
+    }
+
+    /// A rectangle (u, v) in z = 0 and another one (s, t) in z = `distance_m`.
+    pub fn two_plane(
+        (u_m, v_m): ((f64, f64), (f64, f64)),
+        (s_m, t_m): ((f64, f64), (f64, f64)),
+        distance_m: f64,
+    ) -> Self {
+        let apart = |a: (f64, f64), b: (f64, f64)| (b.1 - a.0).abs().max((a.1 - b.0).abs());
+        let across_m = libm::hypot(apart(u_m, s_m), apart(v_m, t_m));
+        let theta_max_rad = libm::atan2(across_m, distance_m).clamp(f64::MIN_POSITIVE, FRAC_PI_2);
+        let chart = Chart::TwoPlane { distance_m, s_m, t_m };
+        Self { x_m: u_m, y_m: v_m, theta_max_rad, chart }
+    }
+
+    /// What its places fill, m²; 0 of a single position, or a line of them.
+    pub fn area_m2(&self) -> f64 {
+        let rectangle = (self.x_m.1 - self.x_m.0) * (self.y_m.1 - self.y_m.0);
+        match self.chart {
+            Chart::Perpendicular { face: Face::Disk } => FRAC_PI_4 * rectangle,
+            _ => rectangle,
+        }
+    }
+
+    /// Whether the ends are finite and in order, and the cone within what the chart names.
     pub(crate) fn is_sound(&self) -> bool {
         let in_order = |(from, to): (f64, f64)| from.is_finite() && to.is_finite() && from <= to;
         in_order(self.x_m)
             && in_order(self.y_m)
             && self.theta_max_rad > 0.0
-            && self.theta_max_rad <= HORIZON_RAD
+            && self.theta_max_rad <= self.chart.theta_end_rad()
+            && self.chart.is_sound()
+            // No basis has functions of the others yet.
+            && self.chart == Chart::Surface
     }
 
     /// How far outside the rectangle a measured position may lie, metres: a readback is never

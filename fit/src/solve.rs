@@ -52,7 +52,7 @@ pub fn fit(
 /// let read = [(0.0, 100.0), (80.0, 41.68)];
 /// let samples: Vec<Sample> =
 ///     read.iter().map(|(t, value)| Sample { ray: ray(*t), value: *value, noise }).collect();
-/// let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 1.4 };
+/// let region = Region::surface((0.0, 0.0), (0.0, 0.0), 1.4);
 /// let basis = BasisSpec::zernike(0, 0);
 /// let field = fit::fit_seen(&samples, &region, basis, &[], Some(&Optics { beam, outline }))?;
 /// assert!((field.value(&ray(80.0)) - 100.0).abs() < 0.1);

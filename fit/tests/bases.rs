@@ -21,8 +21,7 @@ const POSITION: [Position; 3] = [
     Position::Legendre { degree: 2 },
     Position::Splines { spans: 1 },
 ];
-const HEMISPHERE: Region =
-    Region { x_m: (-0.02, 0.02), y_m: (0.005, 0.025), theta_max_rad: FRAC_PI_2 };
+const HEMISPHERE: Region = Region::surface((-0.02, 0.02), (0.005, 0.025), FRAC_PI_2);
 
 fn specs() -> impl Iterator<Item = BasisSpec> {
     let position = |i: usize| POSITION[i % POSITION.len()];

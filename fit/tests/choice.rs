@@ -11,8 +11,7 @@ use scenes::{Die, raster_rays, spread_rays};
 use std::f64::consts::FRAC_PI_2;
 
 /// To 80°, at one place.
-const CONE: Region =
-    Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 80.0 / 90.0 * FRAC_PI_2 };
+const CONE: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 80.0 / 90.0 * FRAC_PI_2);
 
 fn unit(theta: f64, phi: f64) -> [f64; 3] {
     let ((st, ct), (sp, cp)) = (libm::sincos(theta), libm::sincos(phi));

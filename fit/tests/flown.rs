@@ -43,7 +43,7 @@ fn off(fit: &Fit) -> f64 {
 #[test]
 fn the_mean_over_a_way_gives_the_field_and_the_middle_alone_blurs_it() {
     let (samples, flown) = windows();
-    let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 80.0_f64.to_radians() };
+    let region = Region::surface((0.0, 0.0), (0.0, 0.0), 80.0_f64.to_radians());
     let basis = BasisSpec::zernike(8, 0);
     let blurred = fit::fit(&samples, &region, basis, &[]).unwrap();
     let whole = fit::fit_flown(&samples, &flown, &region, basis, &[], None).unwrap();

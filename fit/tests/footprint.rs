@@ -21,7 +21,7 @@ fn stock() -> Beam {
 
 fn region(half_m: f64, theta_max_deg: f64) -> Region {
     let side = (-half_m, half_m);
-    Region { x_m: side, y_m: side, theta_max_rad: theta_max_deg.to_radians() }
+    Region::surface(side, side, theta_max_deg.to_radians())
 }
 
 fn ray(x_m: f64, y_m: f64, theta_deg: f64, phi_deg: f64) -> Ray {

@@ -3,7 +3,7 @@
 use fit::{BasisSpec, Common, FitError, Noise, Optics, Outline, Ray, Region, Sample, Shift};
 use radiometry::beam::Beam;
 
-const REGION: Region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.3 };
+const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.3);
 
 fn rays() -> Vec<Ray> {
     let mut rays = Vec::new();

@@ -206,11 +206,11 @@ fn region_of(input: &InputSamples) -> Region {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
     let (_, theta_max_rad) = extent(|ray| ray.theta_rad);
-    Region {
-        x_m: extent(|ray| ray.x_m),
-        y_m: extent(|ray| ray.y_m),
-        theta_max_rad: theta_max_rad.clamp(f64::MIN_POSITIVE, THETA_MAX_RAD),
-    }
+    Region::surface(
+        extent(|ray| ray.x_m),
+        extent(|ray| ray.y_m),
+        theta_max_rad.clamp(f64::MIN_POSITIVE, THETA_MAX_RAD),
+    )
 }
 
 fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {

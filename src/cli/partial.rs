@@ -116,11 +116,7 @@ fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
     let metres = |(from, to): (f64, f64)| (from * 1e-3, to * 1e-3);
     let optics = args.rig.as_deref().map(optics_of).transpose()?;
     let mut share = Share {
-        region: Region {
-            x_m: metres(x_mm),
-            y_m: metres(y_mm),
-            theta_max_rad: theta_max_deg.to_radians(),
-        },
+        region: Region::surface(metres(x_mm), metres(y_mm), theta_max_deg.to_radians()),
         model: decided(wished(args, DEGREES)?)?,
         optics: optics.as_ref(),
         begun: None,

@@ -206,7 +206,7 @@ pub(crate) fn targets_planned(setup: &Setup) -> usize {
 /// What the plan's fit stands for.
 pub(crate) fn fit_region(setup: &Setup) -> Region {
     let region = setup.region();
-    Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad }
+    Region::surface(region.x_m, region.y_m, region.theta_max_rad)
 }
 
 /// What the rig's detector sees of the plan's sample.

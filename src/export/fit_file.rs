@@ -291,7 +291,7 @@ mod tests {
         let noise = Noise::Fixed { variance: 0.01 };
         let samples: Vec<Sample> =
             (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
-        let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+        let region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
         let basis = BasisSpec::zernike(2, 0);
         let scale = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
         fit::fit(&samples, &region, basis, &[scale]).unwrap()

@@ -10,7 +10,7 @@ use std::io::{self, Write};
 
 use crc::{CRC_64_XZ, Crc};
 use fit::partial::{Partial, Parts, Sums, Weighting};
-use fit::{Angular, BasisSpec, FitError, Optics, Outline, Penalty, Position, Region};
+use fit::{Angular, BasisSpec, Chart, Face, FitError, Optics, Outline, Penalty, Position, Region};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -98,7 +98,7 @@ pub struct PartialsDiffer {
 struct Header {
     program: String,
     quantity: String,
-    chart: String,
+    chart: ChartHeader,
     basis: BasisHeader,
     penalty: PenaltyHeader,
     region: RegionHeader,
@@ -144,11 +144,46 @@ struct PenaltyHeader {
     strength: f64,
 }
 
+/// Its name, and what of the region that chart alone has.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ChartHeader {
+    Surface,
+    Perpendicular { round: bool },
+    Environment,
+    TwoPlane { distance_m: f64, s_m: [f64; 2], t_m: [f64; 2] },
+}
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct RegionHeader {
     x_m: [f64; 2],
     y_m: [f64; 2],
     theta_max_rad: f64,
+}
+
+impl ChartHeader {
+    fn of(chart: Chart) -> Self {
+        match chart {
+            Chart::Surface => Self::Surface,
+            Chart::Perpendicular { face } => Self::Perpendicular { round: face == Face::Disk },
+            Chart::Environment => Self::Environment,
+            Chart::TwoPlane { distance_m, s_m, t_m } => {
+                Self::TwoPlane { distance_m, s_m: s_m.into(), t_m: t_m.into() }
+            }
+        }
+    }
+
+    fn chart(&self) -> Chart {
+        match *self {
+            Self::Surface => Chart::Surface,
+            Self::Perpendicular { round: true } => Chart::Perpendicular { face: Face::Disk },
+            Self::Perpendicular { round: false } => Chart::Perpendicular { face: Face::Rectangle },
+            Self::Environment => Chart::Environment,
+            Self::TwoPlane { distance_m, s_m, t_m } => {
+                Chart::TwoPlane { distance_m, s_m: s_m.into(), t_m: t_m.into() }
+            }
+        }
+    }
 }
 
 impl PartialFile {
@@ -170,11 +205,11 @@ impl PartialFile {
 
     fn header(&self, parts: &Parts) -> Header {
         let Sums { readings, value_squares, weights, variance: (low, high) } = parts.sums;
-        let Region { x_m, y_m, theta_max_rad } = parts.region;
+        let Region { x_m, y_m, theta_max_rad, chart } = parts.region;
         Header {
             program: format!("gonio {}", env!("CARGO_PKG_VERSION")),
             quantity: self.quantity.name().to_owned(),
-            chart: CHART.to_owned(),
+            chart: ChartHeader::of(chart),
             basis: BasisHeader::of(parts.basis),
             penalty: PenaltyHeader { power: parts.penalty.power, strength: parts.penalty.strength },
             region: RegionHeader { x_m: x_m.into(), y_m: y_m.into(), theta_max_rad },
@@ -202,16 +237,18 @@ impl ReadPartial {
             .into_iter()
             .find(|quantity| quantity.name() == header.quantity)
             .ok_or_else(|| unknown("quantity", &header.quantity))?;
-        if header.chart != CHART {
-            return Err(unknown("chart", &header.chart));
-        }
         let weighting = [Weighting::Stated, Weighting::Alike]
             .into_iter()
             .find(|weighting| weights_name(*weighting) == header.weights)
             .ok_or_else(|| unknown("weights", &header.weights))?;
         let RegionHeader { x_m, y_m, theta_max_rad } = header.region;
         let parts = Parts {
-            region: Region { x_m: x_m.into(), y_m: y_m.into(), theta_max_rad },
+            region: Region {
+                x_m: x_m.into(),
+                y_m: y_m.into(),
+                theta_max_rad,
+                chart: header.chart.chart(),
+            },
             basis: header.basis.spec(),
             penalty: Penalty { power: header.penalty.power, strength: header.penalty.strength },
             weighting,
@@ -357,8 +394,6 @@ fn optics_json(optics: &Optics) -> Value {
 
 const NAME: &[u8] = b"gonio-pf";
 const VERSION: u32 = 1;
-/// Rays by where they leave the sample's surface, and in which direction.
-const CHART: &str = "surface";
 static CRC: Crc<u64> = Crc::<u64>::new(&CRC_64_XZ);
 
 #[cfg(test)]

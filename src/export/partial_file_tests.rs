@@ -16,7 +16,7 @@ fn file(region_deg: f64, readings: u32) -> PartialFile {
     let noise = Noise::Fixed { variance: 0.04 };
     let sample = |i: u32| Sample { ray: ray(i), value: 50.0 + 0.1 * f64::from(i % 3), noise };
     let theta_max_rad = region_deg.to_radians();
-    let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad };
+    let region = Region::surface((0.0, 0.0), (0.0, 0.0), theta_max_rad);
     let mut share = Accumulator::new(region, BASIS, None, Weighting::Stated).unwrap();
     share.absorb(&(0..readings).map(sample).collect::<Vec<_>>()).unwrap();
     PartialFile {

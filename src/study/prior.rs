@@ -118,5 +118,5 @@ pub(super) fn ray(pose: Pose) -> Ray {
 /// What the plan's fit stands for.
 pub(super) fn region(plan: &Plan) -> Region {
     let region = plan.region;
-    Region { x_m: region.x_m, y_m: region.y_m, theta_max_rad: region.theta_max_rad }
+    Region::surface(region.x_m, region.y_m, region.theta_max_rad)
 }

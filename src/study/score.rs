@@ -96,11 +96,8 @@ fn position_nodes() -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    const REGION: Region = Region {
-        x_m: (-0.01, 0.03),
-        y_m: (0.0, 0.02),
-        theta_max_rad: core::f64::consts::FRAC_PI_2,
-    };
+    const REGION: Region =
+        Region::surface((-0.01, 0.03), (0.0, 0.02), core::f64::consts::FRAC_PI_2);
 
     #[test]
     fn a_constant_relative_error_is_itself() {

@@ -176,11 +176,8 @@ mod tests {
 
     /// Rows by moments and by places, of beams over a region; how many had moments.
     fn compared(half_m: (f64, f64), degrees: (usize, usize)) -> usize {
-        let region = Region {
-            x_m: (0.003 - half_m.0, 0.003 + half_m.0),
-            y_m: (-half_m.1, half_m.1),
-            theta_max_rad: 1.2,
-        };
+        let region =
+            Region::surface((0.003 - half_m.0, 0.003 + half_m.0), (-half_m.1, half_m.1), 1.2);
         let basis = Basis::new(BasisSpec::zernike(degrees.0, degrees.1), region).unwrap();
         let beam = Beam::of_spot(0.00625, 0.0025, 0.3).unwrap();
         let averager = Averager::new(&Optics { beam, outline: None }, &basis).unwrap();

@@ -23,7 +23,7 @@
 //! let noise = Noise::Fixed { variance: 0.01 };
 //! let samples: Vec<Sample> =
 //!     (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
-//! let region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+//! let region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
 //! let fit = fit::fit(&samples, &region, BasisSpec::zernike(2, 0), &[])?;
 //!
 //! let field = Field::of(&fit);

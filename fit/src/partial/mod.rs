@@ -16,7 +16,7 @@
 //!     value: 100.0 + f64::from(i % 3),
 //!     noise: Noise::Unknown,
 //! };
-//! let region = Region { x_m: (0.0, 0.0), y_m: (0.0, 0.0), theta_max_rad: 1.4 };
+//! let region = Region::surface((0.0, 0.0), (0.0, 0.0), 1.4);
 //! let basis = BasisSpec::zernike(0, 0);
 //! let share = |from: u32| -> Result<_, Box<dyn std::error::Error>> {
 //!     let mut share = Accumulator::new(region, basis, None, Weighting::Alike)?;

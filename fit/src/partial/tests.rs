@@ -3,7 +3,7 @@
 use super::*;
 use crate::{Fit, Ray, Shift};
 
-const REGION: Region = Region { x_m: (-0.01, 0.01), y_m: (-0.01, 0.01), theta_max_rad: 1.4 };
+const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
 const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
 
 /// Readings of a field that the basis holds, scattering by 0.41.

@@ -8,8 +8,7 @@ use rand_pcg::Pcg64;
 use std::f64::consts::{PI, TAU};
 
 /// ±20 mm by ±10 mm, off the origin, to 80°.
-pub(crate) const REGION: Region =
-    Region { x_m: (-0.02, 0.02), y_m: (0.005, 0.025), theta_max_rad: 80.0 * PI / 180.0 };
+pub(crate) const REGION: Region = Region::surface((-0.02, 0.02), (0.005, 0.025), 80.0 * PI / 180.0);
 
 /// A die with a name for what it is cast for.
 pub(crate) struct Die(Pcg64);
