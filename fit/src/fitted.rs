@@ -5,7 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
-use crate::{BasisSpec, BeamRows, FitError, Influence, Penalised, Penalty, Ray, Region};
+use crate::{BasisSpec, BeamRows, FitError, Influence, Penalised, Penalty, Ray, Region, Weighed};
 use radiometry::DomainError;
 use std::f64::consts::FRAC_PI_2;
 
@@ -89,6 +89,7 @@ pub struct Fit {
     basis: Basis,
     parts: Parts,
     influence: Option<Influence>,
+    weighed: Option<Weighed>,
 }
 
 impl Fit {
@@ -106,11 +107,26 @@ impl Fit {
         for common in &parts.shifts {
             demand("shift", p, &common.shift)?;
         }
-        Ok(Self { basis, parts, influence: None })
+        Ok(Self { basis, parts, influence: None, weighed: None })
     }
 
     pub(crate) fn with_influence(self, influence: Influence) -> Self {
         Self { influence: Some(influence), ..self }
+    }
+
+    pub(crate) fn with_weighed(self, weighed: Weighed) -> Self {
+        Self { weighed: Some(weighed), ..self }
+    }
+
+    /// The same fit with other coefficients in the same basis.
+    pub(crate) fn with_parts(&self, parts: Parts) -> Self {
+        Self { parts, ..self.clone() }
+    }
+
+    /// What the fit made of each sample; `None` of a fit that was stored and taken up again, or merged
+    /// from shares.
+    pub fn weighed(&self) -> Option<&Weighed> {
+        self.weighed.as_ref()
     }
 
     /// What each sample did to the exitance; `None` of a fit that was stored and taken up again.

@@ -3,6 +3,7 @@
 
 use crate::basis::dot;
 use crate::beam::design::Design;
+use crate::nuisance::Solved;
 use crate::weights::Settled;
 
 /// What each sample did to the exitance. Lives as long as the fit that made it; it is not stored.
@@ -21,8 +22,14 @@ pub struct Influence {
 }
 
 impl Influence {
-    /// `factor` is the packed S of the covariance S Sᵀ: the gradient of f·c is W A S Sᵀ f.
-    pub(crate) fn of(design: &Design<'_>, settled: &Settled, factor: &[f64]) -> Self {
+    /// `factor` is the packed S of the covariance S Sᵀ: the gradient of f·c is W A S Sᵀ f,
+    /// the rows A being those of the field and, where there are such, of the nuisances.
+    pub(crate) fn of(
+        design: &Design<'_>,
+        settled: &Settled,
+        solved: &Solved,
+        factor: &[f64],
+    ) -> Self {
         let functional = design.basis().exitance();
         let p = functional.len();
         let column = |j: usize| &factor[j * (j + 1) / 2..][..=j];
@@ -33,12 +40,17 @@ impl Influence {
                 *out += product * s;
             }
         }
+        let nuisances = solved.carried(&carried);
         let mut room = design.room();
+        let along = |i: usize| {
+            let columns = settled.columns.iter().zip(&nuisances);
+            columns.map(|(column, carried)| column[i] * carried).sum::<f64>()
+        };
         let exitance = settled
             .variances
             .iter()
             .enumerate()
-            .map(|(i, variance)| design.level(i, &carried, &mut room) / variance)
+            .map(|(i, variance)| (design.level(i, &carried, &mut room) + along(i)) / variance)
             .collect();
         Self { exitance, moved: settled.moved.clone(), excess: settled.excess }
     }

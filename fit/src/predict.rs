@@ -9,7 +9,7 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
-use crate::solve::{left_over, needs_a_side, ready, sensitivities, shifts, solve};
+use crate::solve::{left_over, needs_a_side, ready, sensitivities, shifts, solve_readings};
 use crate::triangle::Solution;
 use crate::weights::{Model, Settled, moved};
 use crate::{Common, FitError, Noise, Ray, Region, Sample, undetermined};
@@ -86,7 +86,7 @@ pub fn predict(
 
     let mut sides = vec![expected];
     sides.extend(fields.iter().map(|field| seen(&mut field.iter().copied())));
-    let mut solution = solve(&design, &variances, &sides, &prior)?;
+    let mut solution = solve_readings(&design, &variances, &sides, &prior)?;
     let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     if prior.is_none() && spectrum.rank() < basis.len() {
         return Err(undetermined::by_rank(samples, &basis));
@@ -96,20 +96,14 @@ pub fn predict(
     let moved = moved(&design, &solution.unknowns(1), &jitters)?;
     if moved.iter().any(|variance| *variance > 0.0) {
         variances.iter_mut().zip(&moved).for_each(|(variance, moved)| *variance += moved);
-        solution = solve(&design, &variances, &sides, &prior)?;
+        solution = solve_readings(&design, &variances, &sides, &prior)?;
     }
     let coefficients: Vec<Vec<f64>> =
         (1..=sides.len()).map(|side| solution.unknowns(side)).collect();
     let residuals: Vec<f64> =
         sides.iter().zip(&coefficients).map(|(side, c)| residual_rms(&design, side, c)).collect();
 
-    let settled = Settled {
-        coefficients: coefficients[0].clone(),
-        levels: sides.swap_remove(0),
-        variances,
-        moved,
-        excess: 0.0,
-    };
+    let settled = Settled::known(coefficients[0].clone(), sides.swap_remove(0), variances, moved);
     let shifts = carried(&common, &design, &settled, &solution, &prior)?;
     let factor = solution.inverse();
     let determined = prior.determined_by(&solution);
@@ -156,7 +150,7 @@ fn carried(
         return Ok(shifts(common, &settled.coefficients, design, solution));
     }
     let sides = sensitivities(design, settled, &shifting)?;
-    let carried = solve(design, &settled.variances, &sides, prior)?;
+    let carried = solve_readings(design, &settled.variances, &sides, prior)?;
     Ok(shifts(common, &settled.coefficients, design, &carried))
 }
 

@@ -10,7 +10,9 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
+use crate::nuisance::{Solved, packed, without};
 use crate::penalty::{Penalised, Prior};
+use crate::readings::{Readings, Weighed};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
 use crate::{Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, undetermined};
@@ -68,10 +70,7 @@ pub fn fit_seen(
     fit_flown(samples, &[], region, model, common, optics)
 }
 
-/// As [`fit_seen`], of readings some of which were taken in flight: `flown` holds, sample by sample,
-/// the rays at the reading's beginning and end, and `None` for one at rest; samples beyond its end
-/// are at rest. The sample's own ray is that of the middle. What a reading in flight says is the
-/// field's mean over its way, but for beams that the sample's outline cuts: those count as at rest.
+/// As [`fit_seen`], of readings some of which were taken in flight: see [`Readings::flown`].
 pub fn fit_flown(
     samples: &[Sample],
     flown: &[Option<(Ray, Ray)>],
@@ -80,26 +79,108 @@ pub fn fit_flown(
     common: &[Common],
     optics: Option<&Optics>,
 ) -> Result<Fit, FitError> {
+    fit_readings(&Readings { flown, common, ..Readings::of(samples) }, region, model, optics)
+}
+
+/// As [`fit_seen`], of readings with all that is known of them: lower limits among them, what is to be
+/// fitted along, how outliers are weighed. [`Fit::weighed`] says what became of each.
+pub fn fit_readings(
+    readings: &Readings<'_>,
+    region: &Region,
+    model: impl Into<Penalised>,
+    optics: Option<&Optics>,
+) -> Result<Fit, FitError> {
     let model = model.into();
+    let Readings { samples, common, nuisances, limits, .. } = *readings;
     let (basis, prior) = ready(samples, region, model, common)?;
-    let design = Design::new(samples, &basis, optics)?.in_flight(flown);
+    check_readings(readings)?;
+    let design = Design::new(samples, &basis, optics)?.in_flight(readings.flown);
     let (common, jitters): (Vec<&Common>, Vec<&Common>) =
         common.iter().partition(|common| common.shift.is_shared());
-    let settled = settle(&design, &prior, &jitters)?;
+    let settled = settle(&design, &prior, readings, &jitters)?;
     let needs_a_side = |common: &Common| needs_a_side(common, &design);
     let shifting: Vec<&Common> = common.iter().copied().filter(|c| needs_a_side(c)).collect();
     let sides = sensitivities(&design, &settled, &shifting)?;
-    let solution = solve(&design, &settled.variances, &sides, &prior)?;
+    let solved = solve(&design, &settled.rows(), &sides, &prior)?;
+    let solution = &solved.field;
     let coefficients = solution.unknowns(0);
-    let shifts = shifts(&common, &coefficients, &design, &solution);
-    let levels = levels(&design, &coefficients);
-    let factor = solution.inverse();
-    let determined = prior.determined_by(&solution);
-    let quality = quality(&design, &levels, (&solution, determined), &settled)?;
-    let influence = Influence::of(&design, &settled, &factor);
+    let mut shifts = shifts(&common, &coefficients, &design, solution);
+    let own: Vec<Vec<f64>> =
+        (0..nuisances.len()).map(|k| solution.unknowns(1 + sides.len() + k)).collect();
+    let inverse = solution.inverse_matrix();
+    let independent = without(&inverse, solution.r(), &own).ok_or(FitError::OutOfRange)?;
+    let factor = packed(&independent, readings.robust.inflation().sqrt());
+    let fitted = solved.fitted(nuisances, &coefficients, &inverse);
+    let settled = Settled {
+        nuisances: solved.nuisances(&coefficients),
+        levels: levels(&design, &coefficients),
+        determined: prior.determined_by(solution),
+        ..settled
+    };
+    let quality = quality(&design, solution, &settled, limits)?;
+    if prior.is_none() && settled.weights.contains(&0.0) {
+        all_determined(&design, solution, &settled)?;
+    }
+    let influence = Influence::of(&design, &settled, &solved, &packed(&inverse, 1.0));
+    let weighed = weighed(readings, &settled, fitted);
+    let own = nuisances.iter().zip(own);
+    shifts.extend(own.map(|(c, shift)| CommonShift { name: c.name.clone(), shift }));
     Fit::from_parts(Parts { region: *region, model, coefficients, factor, shifts, quality })
-        .map(|fit| fit.with_influence(influence))
+        .map(|fit| fit.with_influence(influence).with_weighed(weighed))
         .map_err(|_| FitError::OutOfRange)
+}
+
+/// What readings came with that makes no sense.
+fn check_readings(readings: &Readings<'_>) -> Result<(), FitError> {
+    let Readings { samples, nuisances, limits, .. } = *readings;
+    let is_sound = |c: &&Common| c.shift.is_shared() && c.u.is_finite() && c.u >= 0.0;
+    if let Some(wrong) = nuisances.iter().find(|c| !is_sound(c)) {
+        return Err(FitError::Common { name: wrong.name.clone() });
+    }
+    let is_rising = limits.windows(2).all(|pair| pair[0] < pair[1]);
+    match limits.last() {
+        Some(&last) if !is_rising || last >= samples.len() => {
+            let found = limits.iter().filter(|limit| **limit < samples.len()).count();
+            Err(FitError::Parts { what: "limits", expected: limits.len(), found })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What no longer counts may have been all that was known of a coefficient.
+fn all_determined(
+    design: &Design<'_>,
+    solution: &Solution,
+    settled: &Settled,
+) -> Result<(), FitError> {
+    let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+    if spectrum.rank() == design.basis().len() {
+        return Ok(());
+    }
+    let samples = design.samples().iter().zip(&settled.weights);
+    let kept: Vec<Sample> = samples.filter(|(_, w)| **w > 0.0).map(|(s, _)| *s).collect();
+    Err(undetermined::by_rank(&kept, design.basis()))
+}
+
+fn weighed(
+    readings: &Readings<'_>,
+    settled: &Settled,
+    nuisances: Vec<crate::FittedNuisance>,
+) -> Weighed {
+    let model = Model::of(readings.samples);
+    let shrink = settled.shrink();
+    let residuals = readings.samples.iter().zip(settled.expected()).enumerate();
+    let residuals = residuals.map(|(i, (sample, expected))| {
+        let stated = model.variance(sample.noise, settled.levels[i]) + settled.moved[i];
+        (sample.value - expected) / ((stated + settled.excess) * shrink).sqrt()
+    });
+    Weighed {
+        robust: readings.robust,
+        weights: settled.weights.clone(),
+        residuals: residuals.collect(),
+        limits: readings.limits.to_vec(),
+        nuisances,
+    }
 }
 
 /// The basis and what is held against rough fields, for samples that can be fitted: sound ones, and
@@ -130,9 +211,9 @@ pub(crate) fn weighted(
     let design = Design::new(samples, &basis, optics)?;
     let (common, jitters): (Vec<&Common>, Vec<&Common>) =
         common.iter().partition(|common| common.shift.is_shared());
-    let settled = settle(&design, &prior, &jitters)?;
+    let settled = settle(&design, &prior, &Readings::of(samples), &jitters)?;
     let sides = sensitivities(&design, &settled, &common)?;
-    let triangle = triangle(&design, &settled.variances, &sides)?;
+    let triangle = triangle(&design, &settled.rows(), &sides)?;
     Ok((triangle, settled.variances))
 }
 
@@ -142,35 +223,73 @@ pub(crate) fn levels(design: &Design<'_>, coefficients: &[f64]) -> Vec<f64> {
     (0..design.samples().len()).map(|i| design.level(i, coefficients, &mut room)).collect()
 }
 
-/// What one pass of all rows determines, with the penalty's.
+/// What a pass of all rows is made of, sample by sample.
+#[derive(Clone, Copy)]
+pub(crate) struct Rows<'r> {
+    pub(crate) values: &'r [f64],
+    /// Infinite of samples that count for nothing.
+    pub(crate) variances: &'r [f64],
+    /// The nuisances' columns.
+    pub(crate) columns: &'r [Vec<f64>],
+}
+
+/// What one pass of all rows determines, with the penalty's. Each nuisance has a further side after
+/// `sides`: its prior being off by one.
 pub(crate) fn solve(
+    design: &Design<'_>,
+    rows: &Rows<'_>,
+    sides: &[Vec<f64>],
+    prior: &Prior,
+) -> Result<Solved, FitError> {
+    let triangle = triangle(design, rows, sides)?;
+    let nuisances = rows.columns.len();
+    Solved::of(triangle, nuisances, |field| {
+        prior.absorb_into(field, 1 + sides.len() + nuisances);
+    })
+}
+
+/// What the samples' own values determine under these variances.
+pub(crate) fn solve_readings(
     design: &Design<'_>,
     variances: &[f64],
     sides: &[Vec<f64>],
     prior: &Prior,
 ) -> Result<Solution, FitError> {
-    let mut triangle = triangle(design, variances, sides)?;
-    prior.absorb_into(&mut triangle, sides.len() + 1);
-    triangle.solve().ok_or(FitError::OutOfRange)
+    let values: Vec<f64> = design.samples().iter().map(|sample| sample.value).collect();
+    let rows = Rows { values: &values, variances, columns: &[] };
+    Ok(solve(design, &rows, sides, prior)?.field)
 }
 
 /// One pass of all rows, each divided by its standard uncertainty. `sides` are further right-hand
 /// sides, one vector over the samples each.
 fn triangle(
     design: &Design<'_>,
-    variances: &[f64],
+    rows: &Rows<'_>,
     sides: &[Vec<f64>],
 ) -> Result<Triangle, FitError> {
-    let p = design.basis().len();
-    let mut triangle = Triangle::new(p, 1 + sides.len());
+    let (q, p, s) = (rows.columns.len(), design.basis().len(), sides.len());
+    let mut triangle = Triangle::new(q + p, 1 + s + q);
     let mut room = design.room();
-    let mut row = vec![0.0; p + 1 + sides.len()];
-    for (i, (sample, variance)) in design.samples().iter().zip(variances).enumerate() {
-        design.row(i, &mut room, &mut row[..p]);
-        row[p] = sample.value;
-        for (out, side) in row[p + 1..].iter_mut().zip(sides) {
+    let mut row = vec![0.0; q + p + 1 + s + q];
+    for k in 0..q {
+        row.fill(0.0);
+        (row[k], row[q + p + 1 + s + k]) = (1.0, 1.0);
+        triangle.absorb(&row);
+    }
+    row.fill(0.0);
+    for (i, (value, variance)) in rows.values.iter().zip(rows.variances).enumerate() {
+        if *variance == f64::INFINITY {
+            continue;
+        }
+        for (out, column) in row.iter_mut().zip(rows.columns) {
+            *out = column[i];
+        }
+        design.row(i, &mut room, &mut row[q..q + p]);
+        row[q + p] = *value;
+        for (out, side) in row[q + p + 1..].iter_mut().zip(sides) {
             *out = side[i];
         }
+        row[q + p + 1 + s..].fill(0.0);
         let weight = 1.0 / variance.sqrt();
         if !weight.is_finite() || weight == 0.0 {
             return Err(FitError::OutOfRange);
@@ -246,27 +365,32 @@ pub(crate) fn shifts(
 
 fn quality(
     design: &Design<'_>,
-    levels: &[f64],
-    (solution, determined): (&Solution, f64),
+    solution: &Solution,
     settled: &Settled,
+    limits: &[usize],
 ) -> Result<Quality, FitError> {
     let (samples, excess) = (design.samples(), settled.excess);
     let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     let model = Model::of(samples);
-    let n = samples.len() as f64;
+    let kept = settled.kept(limits);
     let (mut squares, mut chi2) = (0.0, 0.0);
-    for ((sample, level), moved) in samples.iter().zip(levels).zip(&settled.moved) {
-        let square = (sample.value - level).powi(2);
+    for (i, (sample, expected)) in samples.iter().zip(settled.expected()).enumerate() {
+        let weight = settled.weights[i];
+        if weight == 0.0 || limits.binary_search(&i).is_ok() {
+            continue;
+        }
+        let square = (sample.value - expected).powi(2);
         let unstated = if sample.noise == Noise::Unknown { excess } else { 0.0 };
+        let stated = model.variance(sample.noise, settled.levels[i]) + settled.moved[i];
         squares += square;
-        chi2 += square / (model.variance(sample.noise, *level) + moved + unstated);
+        chi2 += weight * square / (stated + unstated);
     }
     Ok(Quality {
         condition: spectrum.condition(),
-        n_used: samples.len(),
-        dof: left_over(samples.len(), determined),
-        determined,
-        residual_rms: (squares / n).sqrt(),
+        n_used: settled.weights.iter().filter(|weight| **weight > 0.0).count(),
+        dof: left_over(kept, settled.determined),
+        determined: settled.determined,
+        residual_rms: (squares / kept.max(1) as f64).sqrt(),
         chi2,
         excess_rms: excess.sqrt(),
         beam: design.rows(&settled.variances),

@@ -9,74 +9,199 @@
 //! residuals are as large as they should be (Paule & Mandel 1982, J. Res. NBS 87, 377).
 
 use crate::beam::design::Design;
+use crate::limit;
 use crate::penalty::Prior;
-use crate::solve::{levels, solve};
-use crate::{Common, FitError, Noise, Sample, Shift, undetermined};
+use crate::readings::Readings;
+use crate::robust::{CUT_SIGMA, cut_square};
+use crate::solve::{Rows, levels, sensitivities, solve};
+use crate::{Common, FitError, Noise, Robust, Sample, Shift, undetermined};
 
 /// Weights that agree with the fit that they lead to.
 pub(crate) struct Settled {
     /// The fit of the last pass.
     pub(crate) coefficients: Vec<f64>,
-    /// Its values along the samples' rays.
+    /// The field's values along the samples' rays.
     pub(crate) levels: Vec<f64>,
-    /// What the samples are weighted by.
+    /// What the nuisances do to the samples, by one u each: a vector over the samples for each.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// What they are found to be, in u.
+    pub(crate) nuisances: Vec<f64>,
+    /// What the samples count as having read: their values, but for limits.
+    pub(crate) values: Vec<f64>,
+    /// What the samples are weighted by; infinite of those that count for nothing.
     pub(crate) variances: Vec<f64>,
+    /// What is left of each one's weight: 1 but for outliers and limits.
+    pub(crate) weights: Vec<f64>,
     /// The part of each variance that comes from rays off the ones that were meant.
     pub(crate) moved: Vec<f64>,
     /// The part of every variance that the stated noise doesn't hold.
     pub(crate) excess: f64,
+    /// What the samples determine of the coefficients.
+    pub(crate) determined: f64,
 }
 
-/// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes. `jitters` are what each
-/// sample's ray is off by on its own.
+/// Fits until the weights agree with the fit, in at most `PASSES_MAX` passes for each way of weighing.
+/// `jitters` are what each sample's ray is off by on its own.
 pub(crate) fn settle(
     design: &Design<'_>,
     prior: &Prior,
+    readings: &Readings<'_>,
     jitters: &[&Common],
 ) -> Result<Settled, FitError> {
     let (samples, basis) = (design.samples(), design.basis());
     let model = Model::of(samples);
-    let mut settled = start(samples, model);
-    for pass in 0..PASSES_MAX {
-        let solution = solve(design, &settled.variances, &[], prior)?;
-        if pass == 0 && prior.is_none() {
-            let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
-            if spectrum.rank() < basis.len() {
-                return Err(undetermined::by_rank(samples, basis));
+    let mut settled = start(readings, model);
+    let mut passes = 0;
+    for robust in readings.robust.phases() {
+        let mut most = PASSES_MAX;
+        if *robust != Robust::None || !readings.limits.is_empty() {
+            most = REWEIGHING_MAX;
+        }
+        for _ in 0..most {
+            let solved = solve(design, &settled.rows(), &[], prior)?;
+            let solution = &solved.field;
+            if passes == 0 && prior.is_none() {
+                let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+                if spectrum.rank() < basis.len() {
+                    return Err(undetermined::by_rank(samples, basis));
+                }
             }
-        }
-        settled.coefficients = solution.unknowns(0);
-        settled.levels = levels(design, &settled.coefficients);
-        let determined = prior.determined_by(&solution);
-        let dof = (samples.len() as f64 - determined).max(0.0);
-        // The field of the second pass is near enough to the last one's: this is of second order.
-        if pass < 2 {
-            settled.moved = moved(design, &settled.coefficients, jitters)?;
-        }
-        let stated = model.variances(samples, &settled);
-        settled.excess = excess(samples, &settled.levels, &stated, dof);
-        let next: Vec<f64> = stated.iter().map(|variance| variance + settled.excess).collect();
-        let change = next.iter().zip(&settled.variances).map(|(a, b)| (a / b - 1.0).abs());
-        let is_settled = change.fold(0.0, f64::max) < SETTLED_RELATIVE;
-        settled.variances = next;
-        if is_settled {
-            break;
+            settled.coefficients = solution.unknowns(0);
+            settled.nuisances = solved.nuisances(&settled.coefficients);
+            settled.levels = levels(design, &settled.coefficients);
+            settled.determined = prior.determined_by(solution);
+            // The field of the second pass is near enough to the last one's: this is of second order.
+            if passes < 2 {
+                settled.moved = moved(design, &settled.coefficients, jitters)?;
+            }
+            passes += 1;
+            let is_settled = settled.reweigh(readings, model, *robust);
+            if !readings.nuisances.is_empty() {
+                let nuisances: Vec<&Common> = readings.nuisances.iter().collect();
+                settled.columns = sensitivities(design, &settled, &nuisances)?;
+            }
+            if is_settled {
+                break;
+            }
         }
     }
     Ok(settled)
 }
 
 /// Before anything is fitted every sample is taken to lie at the mean of all.
-fn start(samples: &[Sample], model: Model) -> Settled {
-    let mean = samples.iter().map(|s| s.value / samples.len() as f64).sum::<f64>();
-    let levels = vec![mean; samples.len()];
+fn start(readings: &Readings<'_>, model: Model) -> Settled {
+    let samples = readings.samples;
+    let n = samples.len();
+    let mean = samples.iter().map(|s| s.value / n as f64).sum::<f64>();
     let excess = if has_unknown(samples) { model.mean_square } else { 0.0 };
-    let moved = vec![0.0; samples.len()];
-    let mut start =
-        Settled { coefficients: Vec::new(), levels, variances: Vec::new(), moved, excess };
+    let mut start = Settled {
+        coefficients: Vec::new(),
+        levels: vec![mean; n],
+        columns: vec![vec![0.0; n]; readings.nuisances.len()],
+        nuisances: vec![0.0; readings.nuisances.len()],
+        values: samples.iter().map(|sample| sample.value).collect(),
+        variances: Vec::new(),
+        weights: vec![1.0; n],
+        moved: vec![0.0; n],
+        excess,
+        determined: 0.0,
+    };
     let stated = model.variances(samples, &start);
     start.variances = stated.into_iter().map(|variance| variance + excess).collect();
     start
+}
+
+impl Settled {
+    /// Where level and variance of every sample are known beforehand.
+    pub(crate) fn known(
+        coefficients: Vec<f64>,
+        levels: Vec<f64>,
+        variances: Vec<f64>,
+        moved: Vec<f64>,
+    ) -> Self {
+        Self {
+            coefficients,
+            columns: Vec::new(),
+            nuisances: Vec::new(),
+            values: levels.clone(),
+            weights: vec![1.0; levels.len()],
+            levels,
+            variances,
+            moved,
+            excess: 0.0,
+            determined: 0.0,
+        }
+    }
+
+    pub(crate) fn rows(&self) -> Rows<'_> {
+        Rows { values: &self.values, variances: &self.variances, columns: &self.columns }
+    }
+
+    /// What each sample should have read, by the field and the nuisances.
+    pub(crate) fn expected(&self) -> Vec<f64> {
+        let mut expected = self.levels.clone();
+        for (column, times) in self.columns.iter().zip(&self.nuisances) {
+            expected.iter_mut().zip(column).for_each(|(sum, z)| *sum += times * z);
+        }
+        expected
+    }
+
+    /// How many samples say what they read.
+    pub(crate) fn kept(&self, limits: &[usize]) -> usize {
+        let is_kept =
+            |(i, weight): (usize, &f64)| *weight > 0.0 && limits.binary_search(&i).is_err();
+        self.weights.iter().enumerate().filter(|each| is_kept(*each)).count()
+    }
+
+    /// The variance of a residual over that of its sample: on average the coefficients take as much of
+    /// it as there are coefficients for a sample.
+    pub(crate) fn shrink(&self) -> f64 {
+        (1.0 - self.determined / self.levels.len() as f64).max(SHRINK_MIN)
+    }
+
+    /// The weights by this fit; whether they are about as they were.
+    fn reweigh(&mut self, readings: &Readings<'_>, model: Model, robust: Robust) -> bool {
+        let (samples, limits) = (readings.samples, readings.limits);
+        let expected = self.expected();
+        let stated = model.variances(samples, self);
+        let is_limit = |i: usize| limits.binary_search(&i).is_ok();
+        let terms: Vec<(f64, f64)> = (0..samples.len())
+            .filter(|i| self.weights[*i] > 0.0 && !is_limit(*i))
+            .map(|i| ((samples[i].value - expected[i]).powi(2), stated[i]))
+            .collect();
+        let dof = (terms.len() as f64 - self.determined).max(0.0);
+        let is_unknown = has_unknown(samples);
+        self.excess = if robust == Robust::None {
+            excess(&terms, dof, is_unknown)
+        } else {
+            cut_excess(&terms, dof, is_unknown)
+        };
+        let (mut change, shrink) = (0.0_f64, self.shrink());
+        for (i, stated) in stated.into_iter().enumerate() {
+            let variance = stated + self.excess;
+            let (old_variance, old_value) = (self.variances[i], self.values[i]);
+            let old_weight = self.weights[i];
+            if is_limit(i) {
+                let working = limit::working(samples[i].value, expected[i], variance);
+                // One far above all that is around it is a disturbance too.
+                let z = (samples[i].value - expected[i]).max(0.0) / (variance * shrink).sqrt();
+                self.weights[i] = robust.weight(z) * variance / working.variance;
+                (self.values[i], self.variances[i]) = (working.value, variance / self.weights[i]);
+                let moved = (working.value - old_value) / variance.sqrt();
+                change = change.max(moved.abs() * self.weights[i].sqrt());
+            } else {
+                let z = (samples[i].value - expected[i]) / (variance * shrink).sqrt();
+                self.weights[i] = robust.weight(z);
+                self.variances[i] = variance / self.weights[i];
+                if old_weight > 0.0 && self.weights[i] > 0.0 {
+                    let old = old_variance * old_weight;
+                    change = change.max((variance / old - 1.0).abs());
+                }
+            }
+            change = change.max((self.weights[i] - old_weight).abs());
+        }
+        change < SETTLED_RELATIVE
+    }
 }
 
 /// The variance of each sample by rays that are off each on its own.
@@ -148,18 +273,12 @@ impl Model {
 
 /// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof (samples less
 /// what they determine: what a penalty smooths away is in the posterior, not counted here twice); 0 where the
-/// stated noise explains the residuals.
-fn excess(samples: &[Sample], levels: &[f64], stated: &[f64], dof: f64) -> f64 {
-    let terms: Vec<(f64, f64)> = samples
-        .iter()
-        .zip(levels)
-        .zip(stated)
-        .map(|((s, l), variance)| ((s.value - l).powi(2), *variance))
-        .collect();
+/// stated noise explains the residuals. `terms` are r² and v.
+fn excess(terms: &[(f64, f64)], dof: f64, is_unknown: bool) -> f64 {
     let sum = |tau2: f64, power: i32| -> f64 {
         terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()
     };
-    let threshold = if has_unknown(samples) { dof } else { threshold(dof) };
+    let threshold = if is_unknown { dof } else { threshold(dof) };
     if dof <= 0.0 || sum(0.0, 1) <= threshold {
         return 0.0;
     }
@@ -176,6 +295,38 @@ fn excess(samples: &[Sample], levels: &[f64], stated: &[f64], dof: f64) -> f64 {
     tau2
 }
 
+/// The same by residuals that are cut off where Huber's weight begins to fall: a few large ones say
+/// nothing of the scatter of the others.
+fn cut_excess(terms: &[(f64, f64)], dof: f64, is_unknown: bool) -> f64 {
+    let n = terms.len() as f64;
+    if dof <= 0.0 {
+        return 0.0;
+    }
+    let sum = |tau2: f64| -> f64 {
+        terms.iter().map(|(r2, v)| cut_square(r2 / (v + tau2) * n / dof)).sum()
+    };
+    let threshold = if is_unknown { n } else { n + EXCESS_SIGMA * CUT_SIGMA * n.sqrt() };
+    if sum(0.0) <= threshold {
+        return 0.0;
+    }
+    // The sum falls as τ² rises. At the largest residual's square it is below n.
+    let mut high = terms.iter().map(|(r2, _)| r2 * n / dof).fold(0.0, f64::max) * 2.0;
+    let mut low = 0.0;
+    for _ in 0..BISECTIONS {
+        // By ratio once there is one: τ² may be anything between rounding and the largest residual.
+        let middle = if low > 0.0 { (low * high).sqrt() } else { high / 16.0 };
+        if sum(middle) > n {
+            low = middle;
+        } else {
+            high = middle;
+        }
+        if low > 0.0 && high / low - 1.0 < NEWTON_RELATIVE {
+            break;
+        }
+    }
+    high
+}
+
 /// The chi² beyond which residuals of so many degrees of freedom are larger than the stated noise.
 pub(crate) fn threshold(dof: f64) -> f64 {
     dof + EXCESS_SIGMA * (2.0 * dof).sqrt()
@@ -185,11 +336,17 @@ pub(crate) fn threshold(dof: f64) -> f64 {
 const UNSTATED_RELATIVE: f64 = 1e-3;
 /// More passes than a fit with weights that settle needs (2 to 4).
 const PASSES_MAX: usize = 8;
+/// Outliers and limits need more: what is downweighted shows how large the others are.
+const REWEIGHING_MAX: usize = 40;
 /// Weights are settled when no variance changes by more: the fit is stationary against its
 /// weights, so that what is left is of second order.
 const SETTLED_RELATIVE: f64 = 0.01;
 /// The excess is taken for real beyond this many standard deviations of chi².
 const EXCESS_SIGMA: f64 = 3.0;
+/// A residual is not taken for smaller than this part of its sample's variance would make it.
+const SHRINK_MIN: f64 = 0.05;
+/// From the largest residual down to rounding in steps of 16, then by halving the ratio.
+const BISECTIONS: usize = 120;
 /// More steps than Newton's method needs from any start.
 const NEWTON_MAX: usize = 60;
 /// The excess is as exact as this.

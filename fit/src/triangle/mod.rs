@@ -145,6 +145,18 @@ impl Triangle {
         Solution::of(self.r, self.unknowns)
     }
 
+    /// The rows of the first `count` unknowns, over all columns, and the triangle of the other unknowns
+    /// with those fitted along.
+    pub(crate) fn split_off(mut self, count: usize) -> (Mat<f64>, Self) {
+        self.settle();
+        let columns = self.columns();
+        let rows = Mat::from_fn(count, columns, |i, j| self.r[(i, j)]);
+        let r =
+            Mat::from_fn(columns - count, columns - count, |i, j| self.r[(count + i, count + j)]);
+        let unknowns = self.unknowns - count;
+        (rows, Self { unknowns, r, gram: None, waiting: Vec::new(), ..self })
+    }
+
     fn columns(&self) -> usize {
         self.unknowns + self.sides
     }
