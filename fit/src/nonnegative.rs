@@ -210,7 +210,10 @@ fn grid(region: &Region, directions: usize, places: usize) -> Vec<Ray> {
             let phi_rad = core::f64::consts::TAU * spoke as f64 / spokes as f64;
             for at in 0..side * side {
                 let (x_m, y_m) = (between(region.x_m, at % side), between(region.y_m, at / side));
-                rays.push(Ray { x_m, y_m, theta_rad, phi_rad });
+                let ray = Ray { x_m, y_m, theta_rad, phi_rad };
+                if region.holds(&ray) {
+                    rays.push(ray);
+                }
             }
         }
     }

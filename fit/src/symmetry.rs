@@ -11,7 +11,7 @@
 
 use crate::basis::Basis;
 use crate::fitted::CommonShift;
-use crate::{Fit, FitError, Parts, Quality, Ray, Region};
+use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
 
@@ -58,6 +58,8 @@ pub enum SymmetryError {
         /// Which symmetry.
         symmetry: Symmetry,
     },
+    /// Only on a flat sample and at a point is it known what a turn does to a ray's coordinates.
+    Chart,
     /// As of a fit.
     Fit(FitError),
 }
@@ -75,6 +77,9 @@ impl std::fmt::Display for SymmetryError {
                 f,
                 "basis `{kind}` over this region doesn't hold the images of its fields under {}",
                 symmetry.name()
+            ),
+            Self::Chart => f.write_str(
+                "a symmetry can be asked for on a flat sample or at a point alone, not in this chart",
             ),
             Self::Fit(error) => error.fmt(f),
         }
@@ -131,6 +136,9 @@ impl Fit {
     /// The field with a symmetry, and how well the readings bear it; refused where that is less often
     /// than once in a hundred symmetric sources. Residuals and condition are those of the fit without it.
     pub fn symmetric(&self, symmetry: Symmetry) -> Result<(Self, SymmetryTest), SymmetryError> {
+        if !matches!(self.region().chart, Chart::Surface | Chart::Environment) {
+            return Err(SymmetryError::Chart);
+        }
         let p = self.coefficients().len();
         let basis = self.functions();
         let v = forbidden(basis, symmetry)?;

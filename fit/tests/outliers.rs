@@ -188,7 +188,7 @@ fn a_glitch_that_fills_the_detector_is_an_outlier_like_others() {
     samples[40].value = 300.0;
     let given = Readings { limits: &[40], robust: Robust::Tukey, ..Readings::of(&samples) };
     let fit = fit_readings(&given, &REGION, BASIS, None).unwrap();
-    assert_eq!(fit.weighed().unwrap().weights[40], 0.0);
+    assert!(fit.weighed().unwrap().weights[40] < 1e-9);
     let exitance = fit.exitance();
     assert!((exitance.value - EXITANCE).abs() < 4.0 * exitance.u);
 }
