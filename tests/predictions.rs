@@ -115,3 +115,49 @@ fn targets_that_are_none_are_refused() {
     bench.gonio(&twice).refused(&["another target for the same quantity"]);
     bench.gonio(&["plan", "plan.toml", "-o", "x.toml"]).refused(&["--output", "add --target"]);
 }
+
+#[test]
+fn a_frontier_sets_flights_beside_stops_with_what_was_foretold() {
+    let bench = expecting();
+    let frontier = ["frontier", "plan.toml", "--out", "front", "--seeds", "2", "--density", "1,2"];
+    let said = bench.gonio(&frontier).well();
+    assert!(said.out.contains("sweep") && said.out.contains("stop-and-go"), "{said}");
+    let csv = bench.text("front/frontier.csv");
+    let mut rows = csv.lines();
+    let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
+    assert_eq!(columns[..3], ["scene", "strategy", "parameters"]);
+    let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
+    let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows.len(), 8, "two strategies, two densities, two seeds\n{csv}");
+    let value = |row: &[&str], name: &str| row[column(name)].parse::<f64>().unwrap();
+    for row in &rows {
+        let (rig_s, way_s) = (value(row, "rig_s"), value(row, "way_s"));
+        assert!(way_s < rig_s, "{rig_s} s, and the way alone {way_s} s");
+        assert!(value(row, "predicted_rig_s") > way_s);
+        assert!(value(row, "photon_limit_relative") > 0.0);
+    }
+    let per_reading = |strategy: &str| {
+        let row = rows.iter().find(|row| row[1] == strategy).unwrap();
+        value(row, "rig_s") / value(row, "readings")
+    };
+    assert!(per_reading("sweep") < 0.2 * per_reading("stop-and-go"));
+    for file in ["frontier.svg", "frontier-exitance.svg", "frontier.html"] {
+        assert!(bench.text(&format!("front/{file}")).contains("</svg>"), "{file}");
+    }
+    // Every run's folder holds the plan that it ran, and is fitted by it again.
+    let flown = bench.text("front/runs/rung2-seed1/plan.toml");
+    assert!(flown.contains("kind = \"sweep\""), "{flown}");
+    bench.gonio(&["fit", "front/runs/rung2-seed1"]).well();
+}
+
+#[test]
+fn a_frontier_says_what_can_not_be_swept() {
+    let bench = expecting();
+    let frontier =
+        |more: &[&str]| bench.gonio(&[&["frontier", "plan.toml", "--out", "f"], more].concat());
+    frontier(&["--strategy", "crawl"]).refused(&["crawl", "stop-and-go or sweep"]);
+    frontier(&["--density", "0"]).refused(&["--density", "a factor from 0.01 to 100"]);
+    // Windows of two readings come faster than the wire takes them.
+    frontier(&["--strategy", "sweep", "--dwell", "0.05"]).refused(&["windows", "the wire carries"]);
+    assert!(!bench.path("f").exists());
+}

@@ -80,14 +80,19 @@ impl Setup {
         Self::build(Inputs::from_memory(inputs), Path::new("plan.toml"), choice, plan_name)
     }
 
-    /// The same rig and scene under another plan: a rung of a ladder.
+    /// The same rig and scene under another plan, whose text takes the place of this one's: a rung of
+    /// a ladder.
     pub(crate) fn with_plan(&self, plan: Plan, seed: u64) -> Result<Self, Failure> {
         let sequence = plan.lay_out(&self.rig, self.list.as_ref())?;
         let plan_hash = plan.hash(&sequence);
         let terms = terms_of(&self.rig, &plan, &sequence, seed, &self.wishes);
         let stage = self.stage.as_ref();
         let stage = stage.map(|stage| stage.on_terms(&self.rig, &terms)).transpose()?;
-        Ok(Self { plan, plan_hash, sequence, stage, seed, ..self.clone() })
+        let mut inputs = self.inputs.clone();
+        for input in inputs.iter_mut().filter(|input| input.role == InputRole::Plan) {
+            input.bytes = plan.document().source().text().as_bytes().to_vec();
+        }
+        Ok(Self { plan, plan_hash, sequence, stage, seed, inputs, ..self.clone() })
     }
 
     fn build(

@@ -4,6 +4,10 @@
 
 use std::fmt::Write as _;
 
+use spanned_toml::{Document, Source};
+
+use super::Plan;
+
 /// A key to set, or to take out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
@@ -25,6 +29,16 @@ impl Change {
     /// Takes a key out, if it is there.
     pub const fn remove(table: &'static str, key: &'static str) -> Self {
         Self { table, key, value: None }
+    }
+}
+
+impl Plan {
+    /// The plan with keys of its text changed, read again; `None` where that is no plan any more.
+    /// What a text can't be changed in is as it was: who asks compares.
+    pub fn changed(&self, changes: &[Change]) -> Option<Self> {
+        let source = self.document().source();
+        let text = rewrite(source.text(), changes);
+        Self::read(Document::parse(Source::new(source.name(), &text)).ok()?).ok()
     }
 }
 

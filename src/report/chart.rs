@@ -16,7 +16,10 @@ use super::ticks::{Ticks, round_down_1_2_5, round_up_1_2_5};
 /// Marks of a series at most: with more, every so many-th is drawn and the extremes.
 const MARKS_MAX: usize = 800;
 const WIDTH: f64 = 820.0;
+/// Of a diagram of something over time.
 const HEIGHT: f64 = 260.0;
+/// Of one with powers on both axes.
+const HEIGHT_LOGARITHMIC: f64 = 420.0;
 /// Placeholders that no plot draws by itself, and what they become.
 const COLOURS: [(&str, &str); 7] = [
     ("#010203", "var(--ink)"),
@@ -41,6 +44,10 @@ pub enum Stroke {
     Line,
     /// A dashed line.
     Dashes,
+    /// A dotted line.
+    Dotted,
+    /// Large pale dots: marks round others that are drawn later.
+    Halos,
 }
 
 /// A series of points.
@@ -105,7 +112,7 @@ impl Chart {
         let plots: Vec<Plot> = self.series.iter().flat_map(Series::plots).collect();
         let mut layout = Layout::auto_from_plots(&plots)
             .with_width(WIDTH)
-            .with_height(HEIGHT)
+            .with_height(if self.is_logarithmic { HEIGHT_LOGARITHMIC } else { HEIGHT })
             .with_theme(theme())
             .with_x_label(self.x_label.clone())
             .with_y_label(self.y_label.clone())
@@ -198,10 +205,21 @@ impl Series {
                     if has_errors { marks.with_y_err(self.errors.iter().copied()) } else { marks };
                 vec![marks.into()]
             }
-            Stroke::Line | Stroke::Dashes => {
+            Stroke::Halos => {
+                let marks = ScatterPlot::new().with_data(points).with_color(colour);
+                let marks = marks.with_size(8.0).with_marker_opacity(0.3);
+                let marks =
+                    if self.name.is_empty() { marks } else { marks.with_legend(&*self.name) };
+                vec![marks.into()]
+            }
+            Stroke::Line | Stroke::Dashes | Stroke::Dotted => {
                 let line =
                     LinePlot::new().with_data(points).with_color(colour).with_stroke_width(1.6);
-                let line = if self.stroke == Stroke::Dashes { line.with_dashed() } else { line };
+                let line = match self.stroke {
+                    Stroke::Dashes => line.with_dashed(),
+                    Stroke::Dotted => line.with_dotted(),
+                    _ => line,
+                };
                 let line =
                     if self.name.is_empty() { line } else { line.with_legend(self.name.as_str()) };
                 vec![line.into()]

@@ -17,7 +17,7 @@ mod ticks;
 
 pub use bars::Budget;
 pub use chart::{Chart, Series, Stroke};
-pub use frontier::frontier_svg;
+pub use frontier::frontier_pictures;
 pub use hemisphere::Hemisphere;
 pub use page::{Report, Section, Table};
 pub use plane::Plane;

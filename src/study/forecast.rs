@@ -45,6 +45,10 @@ pub struct Forecast {
     pub radiance_worst: f64,
     /// The same without the scale.
     pub radiance_worst_without_scale: f64,
+    /// What the light itself leaves of the radiance's relative u, were there no other noise and no
+    /// other error: √(p/N) for p coefficients from N photoelectrons, the mean over the readings of
+    /// a fit of p coefficients to readings of equal noise.
+    pub photon_limit: f64,
     /// Whether the expected radiance fills the gain range.
     pub saturates: bool,
 }
@@ -120,6 +124,7 @@ impl Forecast {
         if readings as f64 * (coefficients as f64).powi(2) > WORK_MAX {
             return Err(ForecastError::TooLarge { readings, coefficients });
         }
+        let photon_limit = libm::sqrt(coefficients as f64 / photoelectrons(&samples));
         let features = [prior.in_direction(plan), prior.in_position(plan)];
         jitter(rig, &features, &calibrated, &mut samples);
         let fields: Vec<Vec<f64>> = features
@@ -151,6 +156,7 @@ impl Forecast {
             of_radiance,
             radiance_worst: worst[0],
             radiance_worst_without_scale: worst[1],
+            photon_limit,
             saturates: prior.level > rig.detector.saturation_radiance(gain),
         })
     }
@@ -190,6 +196,17 @@ fn reading(rig: &Rig, prior: &Prior, step: &Step) -> Reading {
         link_retries: 0,
         unsettled: false,
     }
+}
+
+/// How many the expected radiance frees in all readings: shot noise is their Poisson noise.
+fn photoelectrons(samples: &[Sample]) -> f64 {
+    let of = |sample: &Sample| match sample.noise {
+        Noise::Modelled { per_radiance, .. } if per_radiance > 0.0 => {
+            sample.value.max(0.0) / per_radiance
+        }
+        _ => 0.0,
+    };
+    samples.iter().map(of).sum()
 }
 
 /// Each position is known to its axis's readback alone: where a feature is steep that is noise. What it

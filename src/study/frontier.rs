@@ -1,6 +1,9 @@
 //! What accuracy costs in time: what many scored runs of the rungs say together. It does not know
 //! how a run is made.
 
+use super::Forecast;
+use crate::plan::Prediction;
+
 /// One scored run. Errors are against the truth, relative, with their sign where it has one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrontierRow {
@@ -27,13 +30,69 @@ pub struct FrontierRow {
     /// The same error of the radiance once the best common factor is taken out: what density and
     /// dwell can buy, without what the calibration fixes.
     pub error_shape_rms_relative: f64,
+    /// Fitted over true exitance, less one, once the same factor is taken out.
+    pub error_exitance_shape_relative: f64,
+    /// What was foretold of the rung.
+    pub foretold: Foretold,
     /// Wall time of the simulation and the fit, seconds.
     pub compute_s: f64,
+}
+
+/// What is known of a rung before it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Foretold {
+    /// Rig time, seconds, homing at its most included.
+    pub rig_s: f64,
+    /// The way alone, seconds: no rig with these axes takes the rung's readings in less. Moving
+    /// between poses; a sweep's windows pass while it moves, and are in it.
+    pub way_s: f64,
+    /// Integrating at targets, seconds.
+    pub dwelling_s: f64,
+    /// Of the uncertainty, where there is a forecast.
+    pub uncertainty: Option<ForetoldUncertainty>,
+}
+
+/// Relative standard uncertainties.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForetoldUncertainty {
+    /// Of the radiance, root mean square over the region.
+    pub radiance: f64,
+    /// The same without the scale common to all readings.
+    pub shape: f64,
+    /// Of the exitance.
+    pub exitance: f64,
+    /// The same without the scale.
+    pub exitance_shape: f64,
+    /// What photon noise leaves of the radiance's: see [`super::Forecast::photon_limit`].
+    pub photon_limit: f64,
+}
+
+impl Foretold {
+    const NOTHING: Self = Self { rig_s: 0.0, way_s: 0.0, dwelling_s: 0.0, uncertainty: None };
+
+    /// Of a plan laid out, with or without a forecast of what it will know.
+    pub fn of(is_sweep: bool, prediction: &Prediction, forecast: Option<&Forecast>) -> Self {
+        let flown_s = if is_sweep { prediction.dwelling_s } else { 0.0 };
+        Self {
+            rig_s: prediction.total_s(),
+            way_s: prediction.moving_s + flown_s,
+            dwelling_s: prediction.dwelling_s,
+            uncertainty: forecast.map(|forecast| ForetoldUncertainty {
+                radiance: forecast.of_radiance.u(),
+                shape: forecast.of_radiance.u_without_scale(),
+                exitance: forecast.of_exitance.u(),
+                exitance_shape: forecast.of_exitance.u_without_scale(),
+                photon_limit: forecast.photon_limit,
+            }),
+        }
+    }
 }
 
 /// What the seeds of one rung say together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrontierPoint {
+    /// As in the rows.
+    pub strategy: String,
     /// As in the rows.
     pub parameters: String,
     /// Median rig time, seconds.
@@ -44,38 +103,79 @@ pub struct FrontierPoint {
     pub shape: [f64; 3],
     /// RMS over the seeds of the relative error of the exitance.
     pub exitance_rms: f64,
+    /// The same with that factor taken out.
+    pub exitance_shape_rms: f64,
+    /// What the fits state as the exitance's uncertainty, on average.
+    pub u_exitance: f64,
+    /// What was foretold.
+    pub foretold: Foretold,
+    /// Whether no other point is at least as quick and as good, in the shape's median.
+    pub is_on_front: bool,
 }
 
-/// One point a rung, in order of rig time. Rows of one rung are those with equal parameters.
+/// One point a rung, in order of rig time. Rows of one rung are those with equal strategy and
+/// parameters.
 pub fn points(rows: &[FrontierRow]) -> Vec<FrontierPoint> {
-    let mut parameters: Vec<&str> = Vec::new();
+    let mut names: Vec<(&str, &str)> = Vec::new();
     for row in rows {
-        if !parameters.contains(&row.parameters.as_str()) {
-            parameters.push(&row.parameters);
+        let name = (row.strategy.as_str(), row.parameters.as_str());
+        if !names.contains(&name) {
+            names.push(name);
         }
     }
-    let mut points: Vec<FrontierPoint> = parameters
-        .iter()
-        .map(|name| point(name, &rows.iter().filter(|row| row.parameters == *name)))
+    let is_of = |row: &FrontierRow, name: (&str, &str)| (&*row.strategy, &*row.parameters) == name;
+    let mut points: Vec<FrontierPoint> = names
+        .into_iter()
+        .map(|name| point(name, &rows.iter().filter(|row| is_of(row, name))))
         .collect();
     points.sort_by(|a, b| a.rig_s.total_cmp(&b.rig_s));
+    let mut best = f64::INFINITY;
+    for point in &mut points {
+        point.is_on_front = point.shape[1] < best;
+        best = best.min(point.shape[1]);
+    }
     points
 }
 
-fn point<'a>(name: &str, rows: &(impl Iterator<Item = &'a FrontierRow> + Clone)) -> FrontierPoint {
+/// The points of each strategy, in the order in which the strategies first appear.
+pub fn by_strategy(points: &[FrontierPoint]) -> Vec<(&str, Vec<&FrontierPoint>)> {
+    let mut curves: Vec<(&str, Vec<&FrontierPoint>)> = Vec::new();
+    for point in points {
+        match curves.iter_mut().find(|(name, _)| *name == point.strategy) {
+            Some((_, curve)) => curve.push(point),
+            None => curves.push((&point.strategy, vec![point])),
+        }
+    }
+    curves
+}
+
+fn point<'a>(
+    (strategy, parameters): (&str, &str),
+    rows: &(impl Iterator<Item = &'a FrontierRow> + Clone),
+) -> FrontierPoint {
     let spread = |value: fn(&FrontierRow) -> f64| {
         let mut values: Vec<f64> = rows.clone().map(value).collect();
         values.sort_by(f64::total_cmp);
         [values[0], median(&values), values[values.len() - 1]]
     };
-    let squares: Vec<f64> =
-        rows.clone().map(|row| row.error_exitance_relative * row.error_exitance_relative).collect();
+    let rms = |value: fn(&FrontierRow) -> f64| {
+        let squares: Vec<f64> = rows.clone().map(|row| value(row) * value(row)).collect();
+        libm::sqrt(squares.iter().sum::<f64>() / squares.len() as f64)
+    };
+    let mean = |value: fn(&FrontierRow) -> f64| {
+        rows.clone().map(value).sum::<f64>() / rows.clone().count() as f64
+    };
     FrontierPoint {
-        parameters: name.to_owned(),
+        strategy: strategy.to_owned(),
+        parameters: parameters.to_owned(),
         rig_s: spread(|row| row.rig_s)[1],
         radiance: spread(|row| row.error_radiance_rms_relative),
         shape: spread(|row| row.error_shape_rms_relative),
-        exitance_rms: libm::sqrt(squares.iter().sum::<f64>() / squares.len() as f64),
+        exitance_rms: rms(|row| row.error_exitance_relative),
+        exitance_shape_rms: rms(|row| row.error_exitance_shape_relative),
+        u_exitance: mean(|row| row.u_exitance_relative),
+        foretold: rows.clone().next().map_or(Foretold::NOTHING, |row| row.foretold),
+        is_on_front: false,
     }
 }
 
@@ -88,7 +188,7 @@ fn median(sorted: &[f64]) -> f64 {
 /// A shape that errs by less errs by rounding, about which time decides nothing.
 const ROUNDING: f64 = 1e-12;
 /// Points nearer to each other in time say nothing of twice the time.
-const TIME_MIN: f64 = 1.05;
+const TIME_MIN: f64 = 1.25;
 
 /// In words, what twice the time buys between two neighbouring points: the factor on the error
 /// of the radiance's shape, by the power law through both. `None` where no law can be told: the
@@ -144,6 +244,8 @@ mod tests {
             error_flux_relative: -error,
             u_exitance_relative: error,
             error_shape_rms_relative: error,
+            error_exitance_shape_relative: 0.5 * error,
+            foretold: Foretold::NOTHING,
             compute_s: 0.1,
         }
     }
@@ -163,6 +265,26 @@ mod tests {
             assert!((found - expected).abs() < 1e-15);
         }
         assert!((points[0].exitance_rms - libm::sqrt(0.001)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_quicker_betters() {
+        let mut rows = vec![
+            row("a", 1, 100.0, 0.04),
+            row("b", 1, 200.0, 0.05),
+            row("c", 1, 300.0, 0.02),
+            row("a", 1, 50.0, 0.06),
+        ];
+        rows[3].strategy = "sweep".into();
+        let points = points(&rows);
+        let front: Vec<bool> = points.iter().map(|point| point.is_on_front).collect();
+        assert_eq!(front, [true, true, false, true]);
+        let curves = by_strategy(&points);
+        assert_eq!(
+            curves.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
+            ["sweep", "stop-and-go"]
+        );
+        assert_eq!(curves[1].1.len(), 3);
     }
 
     #[test]

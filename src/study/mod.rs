@@ -11,12 +11,17 @@ mod parts;
 mod prior;
 mod score;
 mod search;
+mod strategy;
 
 pub use demand::{Demand, Shortfall};
 pub use forecast::{Forecast, ForecastError};
-pub use frontier::{Coverage, FrontierPoint, FrontierRow, coverage, doubling, points};
+pub use frontier::{
+    Coverage, Foretold, ForetoldUncertainty, FrontierPoint, FrontierRow, by_strategy, coverage,
+    doubling, points,
+};
 pub use ladder::{LADDER, Rung};
 pub use parts::Budget;
 pub use prior::{Feature, Prior};
 pub use score::Score;
 pub use search::{Candidate, Considered, Found, Search, SearchError};
+pub use strategy::Strategy;

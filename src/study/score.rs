@@ -22,6 +22,8 @@ pub struct Score {
     /// The same once the best common factor is taken out of the fit: what a calibration of the
     /// scale could not mend. 1 for a fit that has nothing of the truth.
     pub shape_rms_relative: f64,
+    /// That factor: what the fit has to be multiplied by. 0 for a fit that has nothing of the truth.
+    pub factor: f64,
 }
 
 impl Score {
@@ -48,7 +50,7 @@ impl Score {
             let error = sum(&|fitted, truth| (factor * fitted - truth) * (factor * fitted - truth));
             libm::sqrt(error / signal)
         };
-        Some(Self { rms_relative: rms(1.0), shape_rms_relative: rms(factor) })
+        Some(Self { rms_relative: rms(1.0), shape_rms_relative: rms(factor), factor })
     }
 }
 

@@ -8,10 +8,11 @@
 
 use std::time::Duration;
 
-use spanned_toml::{Document, Problem, Source};
+use spanned_toml::{Problem, Source};
 
-use super::{Demand, Forecast, ForecastError, Rung, Shortfall};
-use crate::plan::{Change, Plan, Schedule, rewrite};
+use super::ladder::spacing;
+use super::{Demand, Forecast, ForecastError, Rung, Shortfall, Strategy};
+use crate::plan::{Change, Plan, Schedule};
 use crate::rig::Rig;
 
 /// Factors on the number of targets.
@@ -138,7 +139,7 @@ impl Search<'_> {
     fn variants(&self) -> Vec<Variant> {
         let mut variants = Vec::new();
         for density in DENSITIES {
-            let plan = Rung { density, dwell: 1.0 }.apply(self.plan);
+            let plan = Rung { density, ..Rung::ITSELF }.apply(self.plan);
             let mut degrees = vec![self.plan.fit.angular_degree, plan.fit.angular_degree];
             degrees.dedup();
             for degree in degrees {
@@ -151,7 +152,7 @@ impl Search<'_> {
                     }
                 }
                 variants.push((what.clone(), changes.clone()));
-                if let Some(sweep) = self.as_sweep(&plan.schedule) {
+                if let Some(sweep) = self.as_sweep(&plan) {
                     changes.retain(|change| change.table != "schedule");
                     changes.extend(sweep);
                     variants.push((format!("sweeps, {what}"), changes));
@@ -175,21 +176,12 @@ impl Search<'_> {
         variants
     }
 
-    /// Sweeps along meridians instead of a grid of directions.
-    fn as_sweep(&self, schedule: &Schedule) -> Option<Vec<Change>> {
-        let narrowest = self.plan.expect.narrowest_feature_rad?.to_degrees();
-        let step = match *schedule {
-            Schedule::CGamma { c_step_deg, .. } => c_step_deg,
-            Schedule::Raster { phi_step_deg, .. } => phi_step_deg,
-            _ => return None,
-        };
-        let gone = ["theta_step_deg", "gamma_step_deg", "c_step_deg", "order"];
-        let mut changes: Vec<Change> =
-            gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
-        changes.push(Change::set("schedule", "kind", "\"sweep\""));
-        changes.push(Change::set("schedule", "phi_step_deg", step));
-        changes.push(Change::set("schedule", "narrowest_deg", narrowest));
-        Some(changes)
+    /// Sweeps along meridians instead of a grid of directions, where the plan says how narrow its
+    /// features are.
+    fn as_sweep(&self, plan: &Plan) -> Option<Vec<Change>> {
+        let is_grid = matches!(plan.schedule, Schedule::CGamma { .. } | Schedule::Raster { .. });
+        let is_known = self.plan.expect.narrowest_feature_rad.is_some();
+        if is_grid && is_known { Strategy::Sweep.changes(plan) } else { None }
     }
 
     /// The variant with the shortest dwell that reaches all targets, or with the longest if none
@@ -240,14 +232,12 @@ impl Search<'_> {
 
     /// The plan with these changes and this dwell, if its text can be changed so.
     fn with(&self, changes: &[Change], dwell_ms: f64) -> Option<(Plan, String)> {
-        let source = self.plan.document().source();
         let mut changes = changes.to_vec();
         let dwell_ms = rounded_up(dwell_ms);
         changes.push(Change::set("dwell", "dwell_ms", dwell_ms));
         changes.push(Change::remove("schedule", "window_ms"));
-        let text = rewrite(source.text(), &changes);
-        let document = Document::parse(Source::new(source.name(), &text)).ok()?;
-        let plan = Plan::read(document).ok()?;
+        let plan = self.plan.changed(&changes)?;
+        let text = plan.document().source().text().to_owned();
         // A text that could not be changed is read as it was.
         ((ms(plan.dwell) - dwell_ms).abs() < 1e-3 + 1e-6 * dwell_ms).then_some((plan, text))
     }
@@ -281,27 +271,6 @@ pub enum SearchError {
     /// Nothing can be foretold of it.
     #[error(transparent)]
     Forecast(#[from] ForecastError),
-}
-
-/// The keys that say how dense a schedule is.
-fn spacing(schedule: &Schedule) -> Vec<Change> {
-    let set = |key: &'static str, value: f64| Change::set("schedule", key, value);
-    match *schedule {
-        Schedule::CGamma { c_step_deg, gamma_step_deg, .. } => {
-            vec![set("c_step_deg", c_step_deg), set("gamma_step_deg", gamma_step_deg)]
-        }
-        Schedule::Raster { theta_step_deg, phi_step_deg, .. } => {
-            vec![set("theta_step_deg", theta_step_deg), set("phi_step_deg", phi_step_deg)]
-        }
-        Schedule::LowDiscrepancy { count } => vec![Change::set("schedule", "count", count)],
-        Schedule::Sweep { phi_step_deg, speed_deg_per_s, narrowest_deg, .. } => {
-            let mut changes = vec![set("phi_step_deg", phi_step_deg)];
-            changes.extend(speed_deg_per_s.map(|speed| set("speed_deg_per_s", speed)));
-            changes.extend(narrowest_deg.map(|narrowest| set("narrowest_deg", narrowest)));
-            changes
-        }
-        Schedule::List { .. } => Vec::new(),
-    }
 }
 
 fn ms(duration: Duration) -> f64 {

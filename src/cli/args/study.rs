@@ -5,19 +5,38 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{EffectArgs, RigArgs};
+use crate::study::Strategy;
+
+/// On densities, dwells and speeds.
+const FACTORS: (f64, f64) = (0.01, 100.0);
 
 #[derive(Debug, Args)]
 pub(crate) struct FrontierArgs {
-    /// The plan whose schedule and dwell are scaled.
+    /// The plan whose schedule and dwell are scaled, and whose readings are taken at rest and in
+    /// flight.
     pub(crate) plan: PathBuf,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
     #[command(flatten)]
     pub(crate) effects: EffectArgs,
+    /// stop-and-go or sweep, with commas between. Default: both, where the plan can be flown.
+    #[arg(long = "strategy", value_name = "NAMES", value_delimiter = ',', value_parser = strategy)]
+    pub(crate) strategies: Vec<Strategy>,
+    /// Factors on the number of targets, with commas between; every combination with --dwell and
+    /// --speed is run. Default: a ladder of five rungs, from half to twice the plan's targets and
+    /// dwell.
+    #[arg(long = "density", value_name = "FACTORS", value_delimiter = ',', value_parser = factor)]
+    pub(crate) densities: Vec<f64>,
+    /// Factors on the dwell; of a sweep on its windows.
+    #[arg(long = "dwell", value_name = "FACTORS", value_delimiter = ',', value_parser = factor)]
+    pub(crate) dwells: Vec<f64>,
+    /// Factors on the speed of sweeps.
+    #[arg(long = "speed", value_name = "FACTORS", value_delimiter = ',', value_parser = factor)]
+    pub(crate) speeds: Vec<f64>,
     /// How many seeds each rung is run with, from --seed upwards.
     #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(crate) seeds: u64,
-    /// The folder for frontier.csv and frontier.svg; must not hold them yet. Default: frontier-NAME-UTC.
+    /// The folder for frontier.csv, frontier.html and the pictures; must not be there yet. Default: frontier-NAME-UTC.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the table as JSON lines.
@@ -63,6 +82,16 @@ pub(crate) struct CoverageArgs {
     /// Print one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn strategy(text: &str) -> Result<Strategy, String> {
+    let named = Strategy::ALL.into_iter().find(|strategy| strategy.name() == text);
+    named.ok_or_else(|| format!("expected {}", Strategy::ALL.map(Strategy::name).join(" or ")))
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse().ok().filter(|factor| (FACTORS.0..=FACTORS.1).contains(factor));
+    factor.ok_or_else(|| format!("expected a factor from {} to {}", FACTORS.0, FACTORS.1))
 }
 
 fn runs(text: &str) -> Result<usize, String> {

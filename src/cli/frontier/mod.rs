@@ -1,0 +1,166 @@
+//! `gonio frontier`: what accuracy costs in time. Runs a plan at several densities and dwells, at
+//! rest and in flight, on the simulated rig, with several seeds, and scores every run against the truth.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressDrawTarget};
+
+use self::rungs::{Entry, entries};
+use super::acquire::{Acquired, Pace, acquire};
+use super::args::FrontierArgs;
+use super::failure::{Failure, Outcome};
+use super::folder::create;
+use super::output::{say, write_out};
+use super::results::Results;
+use super::run::first_job;
+use super::session::utc_stamp;
+use super::setup::Setup;
+use crate::export::{ExportError, write_atomically, write_frontier};
+use crate::journal::Order;
+use crate::report::frontier_pictures;
+use crate::run::OnFault;
+use crate::study::{FrontierPoint, FrontierRow, points};
+
+mod rungs;
+mod words;
+
+/// Runs every rung of every strategy, writes frontier.csv, its pictures and its page, and prints the
+/// table.
+pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
+    let setup = Setup::from_disk(&args.plan, &args.rig, &args.effects)?;
+    if setup.stage.is_none() {
+        return Err(Failure::with_help(
+            format!("{}: errors are known on a simulated rig alone", setup.rig.name),
+            "choose one with --rig, and what it looks at with --scene",
+        ));
+    }
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| format!("frontier-{}-{}", setup.plan_name, utc_stamp()).into());
+    if folder.exists() {
+        return Err(Failure::with_help(
+            format!("{}: exists already; nothing is overwritten", folder.display()),
+            "choose another folder with --out",
+        ));
+    }
+    // What a rung can't do is found before anything is made.
+    let entries = entries(&setup, args)?;
+    std::fs::create_dir_all(folder.join("runs"))
+        .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
+    let rows = run_all(&entries, &folder, args.seeds)?;
+    let points = points(&rows);
+    write(&setup, &folder, &rows, &points).map_err(Failure::midway)?;
+    if args.json {
+        write_out(|out| rows.iter().try_for_each(|row| writeln!(out, "{}", words::as_json(row))))?;
+    } else {
+        say(&format!("{}  folder {}\n", words::as_text(&rows, &points), folder.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(
+    setup: &Setup,
+    folder: &Path,
+    rows: &[FrontierRow],
+    points: &[FrontierPoint],
+) -> Result<(), ExportError> {
+    let title = format!("{}: what accuracy costs in time", setup.plan_name);
+    write_atomically(&folder.join("frontier.csv"), |out| write_frontier(out, rows))?;
+    let pictures = frontier_pictures(&setup.plan_name, rows, points);
+    for picture in &pictures {
+        let svg = picture.document();
+        let path = folder.join(format!("{}.svg", picture.name));
+        write_atomically(&path, |out| out.write_all(svg.as_bytes()))?;
+    }
+    let page = words::page(setup, &title, rows, points, pictures);
+    write_atomically(&folder.join("frontier.html"), |out| page.write(out))
+}
+
+/// Every rung with every seed, on as many threads as the machine has; the rows in a fixed order.
+fn run_all(entries: &[Entry], folder: &Path, seeds: u64) -> Result<Vec<FrontierRow>, Failure> {
+    let runs: Vec<(usize, u64)> =
+        (0..entries.len()).flat_map(|entry| (0..seeds).map(move |k| (entry, k))).collect();
+    let bar = ProgressBar::with_draw_target(
+        Some(runs.len() as u64),
+        ProgressDrawTarget::stderr_with_hz(5),
+    );
+    let next = AtomicUsize::new(0);
+    let done: Mutex<Vec<(usize, Result<FrontierRow, Failure>)>> = Mutex::default();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(runs.len()) {
+            scope.spawn(|| {
+                loop {
+                    let place = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(&(i, k)) = runs.get(place) else { break };
+                    let folder = folder.join("runs").join(format!("rung{i}-seed{}", 1 + k));
+                    let row = run_one(&entries[i], &folder, k);
+                    bar.inc(1);
+                    // A thread that panicked has ended the program's work already.
+                    if let Ok(mut done) = done.lock() {
+                        done.push((place, row));
+                    }
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let mut done = done.into_inner().unwrap_or_default();
+    done.sort_by_key(|(place, _)| *place);
+    done.into_iter().map(|(_, row)| row).collect()
+}
+
+fn run_one(entry: &Entry, folder: &Path, k: u64) -> Result<FrontierRow, Failure> {
+    let began = Instant::now();
+    let seed = entry.setup.seed.wrapping_add(k);
+    let setup = entry.setup.with_plan(entry.setup.plan.clone(), seed)?;
+    let acquired = acquire(&setup, Pace::Virtual, || {
+        let (journal, _) = create(folder, &setup)?;
+        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
+    })?;
+    let Acquired { rig_s, journal, .. } = acquired;
+    let journal = journal.map_err(Failure::midway)?;
+    let readings = journal.reader().readings(Order::Taken)?;
+    let results = Results::of(&setup, setup.plan.fit, &readings)?;
+    journal.close().map_err(Failure::midway)?;
+    row(entry, &setup, &results, rig_s, readings.len(), began)
+}
+
+fn row(
+    entry: &Entry,
+    setup: &Setup,
+    results: &Results,
+    rig_s: f64,
+    readings: usize,
+    began: Instant,
+) -> Result<FrontierRow, Failure> {
+    let fitted = results.fitted.as_ref().map_err(|error| {
+        let (strategy, rung) = (entry.strategy.name(), entry.rung.parameters());
+        Failure::midway(format!("{strategy}, {rung}: fit: {error}"))
+    })?;
+    let (truth, score) = results.truth.zip(results.score).ok_or_else(|| {
+        Failure::start("the scene is dark: relative errors need some light in the plan's region")
+    })?;
+    let (exitance, flux) = (fitted.fit.exitance(), fitted.fit.flux());
+    Ok(FrontierRow {
+        scene: setup.plan_name.clone(),
+        strategy: entry.strategy.name().to_owned(),
+        parameters: entry.parameters(),
+        seed: setup.seed,
+        rig_s,
+        readings: u32::try_from(readings).unwrap_or(u32::MAX),
+        error_radiance_rms_relative: score.rms_relative,
+        error_exitance_relative: exitance.value / truth.exitance - 1.0,
+        error_flux_relative: flux.value / truth.flux - 1.0,
+        u_exitance_relative: exitance.u / exitance.value,
+        error_shape_rms_relative: score.shape_rms_relative,
+        error_exitance_shape_relative: score.factor * exitance.value / truth.exitance - 1.0,
+        foretold: entry.foretold,
+        compute_s: began.elapsed().as_secs_f64(),
+    })
+}

@@ -1,0 +1,158 @@
+//! A plan by other means: at rest at every target, or in flight past them. Every variant is the
+//! plan's own text with some keys changed, read again, so that what is run is what is written.
+
+use crate::plan::{Change, Plan, Schedule};
+
+/// How a plan takes its readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Strategy {
+    /// A reading at a time, the axes at rest.
+    StopAndGo,
+    /// In windows while the arm flies along a meridian.
+    Sweep,
+}
+
+/// Meridians where neither the plan's grid nor its fit says how many.
+const PHI_STEP_DEG: f64 = 15.0;
+/// Columns and rows of places where the plan pins no degree in position.
+const PLACES: usize = 2;
+
+impl Strategy {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::StopAndGo, Self::Sweep];
+
+    /// As frontier.csv and the command line say it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::StopAndGo => "stop-and-go",
+            Self::Sweep => "sweep",
+        }
+    }
+
+    /// The one of a schedule.
+    pub fn of(schedule: &Schedule) -> Self {
+        match schedule {
+            Schedule::Sweep { .. } => Self::Sweep,
+            Schedule::CGamma { .. }
+            | Schedule::List { .. }
+            | Schedule::LowDiscrepancy { .. }
+            | Schedule::Raster { .. } => Self::StopAndGo,
+        }
+    }
+
+    /// What makes the plan one of this strategy: nothing where it is; `None` where it can't be,
+    /// since a list of poses has no meridians.
+    ///
+    /// Sweeps take the meridians and the places of a grid; where the schedule has none, as many as
+    /// the fit's degrees need. A grid takes the sweeps' meridians and places, and two circles within
+    /// the narrowest feature.
+    pub fn changes(self, plan: &Plan) -> Option<Vec<Change>> {
+        match (Self::of(&plan.schedule), self) {
+            (Self::StopAndGo, Self::StopAndGo) | (Self::Sweep, Self::Sweep) => Some(Vec::new()),
+            (Self::StopAndGo, Self::Sweep) => sweeps(plan),
+            (Self::Sweep, Self::StopAndGo) => grid(plan),
+        }
+    }
+}
+
+fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
+    let places =
+        u32::try_from(plan.fit.position_degree.map_or(PLACES, |degree| degree + 1)).ok()?;
+    let (places, phi_step_deg, theta_step_deg) = match plan.schedule {
+        Schedule::CGamma { x_count, y_count, c_step_deg, gamma_step_deg } => {
+            ((x_count, y_count), c_step_deg, gamma_step_deg)
+        }
+        Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
+            ((x_count, y_count), phi_step_deg, theta_step_deg)
+        }
+        Schedule::LowDiscrepancy { .. } => {
+            // A polynomial of degree n has n waves round the circle: 2n + 1 meridians, made even.
+            let step = |degree: usize| 360.0 / (2 * (degree + 1)) as f64;
+            let step = plan.fit.angular_degree.map_or(PHI_STEP_DEG, step);
+            ((places, places), step, step)
+        }
+        Schedule::List { .. } | Schedule::Sweep { .. } => return None,
+    };
+    // What the grid resolves where the plan doesn't say what there is to resolve.
+    let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
+    let narrowest_deg = declared.unwrap_or(2.0 * theta_step_deg);
+    let gone = ["count", "theta_step_deg", "gamma_step_deg", "c_step_deg", "order"];
+    let mut changes: Vec<Change> =
+        gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
+    changes.push(Change::set("schedule", "kind", "\"sweep\""));
+    changes.push(Change::set("schedule", "x_count", places.0));
+    changes.push(Change::set("schedule", "y_count", places.1));
+    changes.push(Change::set("schedule", "phi_step_deg", phi_step_deg));
+    changes.push(Change::set("schedule", "narrowest_deg", narrowest_deg));
+    Some(changes)
+}
+
+fn grid(plan: &Plan) -> Option<Vec<Change>> {
+    let Schedule::Sweep { phi_step_deg, narrowest_deg, .. } = plan.schedule else { return None };
+    let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
+    let narrowest_deg = narrowest_deg.or(declared).unwrap_or(phi_step_deg);
+    let gone = ["speed_deg_per_s", "narrowest_deg", "window_ms"];
+    let mut changes: Vec<Change> =
+        gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
+    changes.push(Change::set("schedule", "kind", "\"raster\""));
+    changes.push(Change::set("schedule", "theta_step_deg", 0.5 * narrowest_deg));
+    Some(changes)
+}
+
+#[cfg(test)]
+mod tests {
+    use spanned_toml::{Document, Source};
+
+    use super::*;
+
+    fn plan(schedule: &str) -> Plan {
+        let text = format!(
+            "[region]\nx_mm = [-1, 1]\ny_mm = [-1, 1]\ntheta_max_deg = 80\n[schedule]\n{schedule}\n\
+             [dwell]\ndwell_ms = 50\n[dark]\nmethod = \"shutter\"\n\
+             [fit]\nangular_degree = 8\nposition_degree = 2\n"
+        );
+        Plan::read(Document::parse(Source::new("plan.toml", &text)).unwrap()).unwrap()
+    }
+
+    fn into(strategy: Strategy, plan: &Plan) -> Schedule {
+        plan.changed(&strategy.changes(plan).unwrap()).unwrap().schedule
+    }
+
+    #[test]
+    fn a_grid_flies_along_its_own_meridians_and_comes_back() {
+        let raster = plan(
+            "kind = \"raster\"\nx_count = 2\ny_count = 3\ntheta_step_deg = 5\nphi_step_deg = 30",
+        );
+        let flown = into(Strategy::Sweep, &raster);
+        let expected = Schedule::Sweep {
+            x_count: 2,
+            y_count: 3,
+            phi_step_deg: 30.0,
+            speed_deg_per_s: None,
+            narrowest_deg: Some(10.0),
+        };
+        assert_eq!(flown, expected);
+        let sweep = plan(
+            "kind = \"sweep\"\nx_count = 2\ny_count = 3\nphi_step_deg = 30\nnarrowest_deg = 10\n\
+             window_ms = 5",
+        );
+        assert_eq!(into(Strategy::StopAndGo, &sweep), raster.schedule);
+    }
+
+    #[test]
+    fn poses_that_fill_the_region_fly_as_the_fit_needs() {
+        let plan = plan("kind = \"low-discrepancy\"\ncount = 500");
+        let Schedule::Sweep { x_count, y_count, phi_step_deg, .. } = into(Strategy::Sweep, &plan)
+        else {
+            panic!("a sweep");
+        };
+        assert_eq!((x_count, y_count, phi_step_deg), (3, 3, 20.0));
+    }
+
+    #[test]
+    fn a_list_can_not_fly_and_stays_what_it_is() {
+        let list = plan("kind = \"list\"\nfile = \"poses.csv\"");
+        assert_eq!(Strategy::Sweep.changes(&list), None);
+        assert_eq!(Strategy::StopAndGo.changes(&list), Some(Vec::new()));
+    }
+}
