@@ -48,11 +48,15 @@ pub(crate) fn check_sample(index: usize, sample: &Sample, region: &Region) -> Re
         return Err(FitError::NotFinite { index, what });
     }
     check_noise(index, sample.noise)?;
-    if !(0.0..=region.chart.theta_end_rad()).contains(&ray.theta_rad) {
-        return Err(FitError::Theta { index, theta_rad: ray.theta_rad });
+    let end_rad = region.chart.theta_end_rad();
+    if !(0.0..=end_rad).contains(&ray.theta_rad) {
+        return Err(FitError::Theta { index, theta_rad: ray.theta_rad, end_rad });
     }
     if !region.holds(ray) {
         return Err(FitError::OutsideRegion { index, x_m: ray.x_m, y_m: ray.y_m });
+    }
+    if let Some((s_m, t_m)) = region.missed_second_plane(ray) {
+        return Err(FitError::OutsideSecondPlane { index, s_m, t_m });
     }
     Ok(())
 }

@@ -21,6 +21,28 @@ pub enum FitError {
         /// Most that are taken.
         coefficients_max: usize,
     },
+    /// A basis of another chart: directions below the horizon, say, or places in a second plane.
+    BasisOfChart {
+        /// Which functions.
+        kind: &'static str,
+        /// The region's chart.
+        chart: &'static str,
+    },
+    /// Two planes so near to each other, for their size, that the throughput between them can't be
+    /// integrated.
+    PlanesTooNear {
+        /// From one to the other, metres.
+        distance_m: f64,
+    },
+    /// A ray that misses the second rectangle of the two-plane chart.
+    OutsideSecondPlane {
+        /// The sample.
+        index: usize,
+        /// Where it pierces the second plane, metres.
+        s_m: f64,
+        /// Where it pierces the second plane, metres.
+        t_m: f64,
+    },
     /// A basis out of its range: harmonics beyond degree 200, say.
     Basis {
         /// Which functions.
@@ -59,12 +81,15 @@ pub enum FitError {
         /// Variance per radiance as handed in.
         value: f64,
     },
-    /// A direction below the sample's plane, which the surface chart doesn't have.
+    /// A direction below the sample's plane, which the surface chart doesn't have; or beyond the
+    /// nadir, which no chart has.
     Theta {
         /// The sample.
         index: usize,
         /// From the normal, radians.
         theta_rad: f64,
+        /// The chart's largest, radians.
+        end_rad: f64,
     },
     /// A position off the region. Polynomials extrapolate badly: widen the region instead.
     OutsideRegion {
@@ -121,13 +146,37 @@ impl fmt::Display for FitError {
         match self {
             Self::Empty => f.write_str("no samples: there is nothing to fit"),
             Self::Region => f.write_str(
-                "region: ends must be finite and in order, theta_max above 0° and at most 90°",
+                "region: ends must be finite and in order, theta_max above 0° and at most 90° (180° \
+                 where a chart has all directions)",
             ),
             Self::Outline => f.write_str(
                 "outline of the sample: ends must be finite and in order, a radius above 0",
             ),
             Self::TooLarge { coefficients, coefficients_max } => {
                 write!(f, "{coefficients} coefficients are more than {coefficients_max}")
+            }
+            Self::BasisOfChart { kind, chart } => write!(
+                f,
+                "basis `{kind}`: it has no functions of the {chart} chart; expected {}",
+                match *chart {
+                    "surface" => "zernike, hemispherical, even-harmonics or splines",
+                    "two-plane" => "legendre",
+                    _ => "spherical",
+                }
+            ),
+            Self::PlanesTooNear { distance_m } => write!(
+                f,
+                "planes {} mm apart are too near to each other for their size: the throughput \
+                 between them can't be integrated",
+                distance_m * 1e3
+            ),
+            Self::OutsideSecondPlane { index, s_m, t_m } => {
+                let (s_mm, t_mm) = (s_m * 1e3, t_m * 1e3);
+                write!(
+                    f,
+                    "sample {index}: (s, t) = ({s_mm:.3}, {t_mm:.3}) mm lies outside the second \
+                     rectangle"
+                )
             }
             Self::Basis { kind } => {
                 write!(f, "basis `{kind}`: its degree or spans are beyond what it is good for")
@@ -147,9 +196,9 @@ impl fmt::Display for FitError {
             Self::ShotNoise { index, value } => {
                 write!(f, "sample {index}: variance per radiance {value:e}, expected 0 or more")
             }
-            Self::Theta { index, theta_rad } => {
-                let theta_deg = theta_rad.to_degrees();
-                write!(f, "sample {index}: theta {theta_deg:.3}° is outside 0° to 90°")
+            Self::Theta { index, theta_rad, end_rad } => {
+                let (theta_deg, end_deg) = (theta_rad.to_degrees(), end_rad.to_degrees());
+                write!(f, "sample {index}: theta {theta_deg:.3}° is outside 0° to {end_deg:.0}°")
             }
             Self::OutsideRegion { index, x_m, y_m } => {
                 let (x_mm, y_mm) = (x_m * 1e3, y_m * 1e3);

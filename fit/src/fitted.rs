@@ -7,7 +7,7 @@ use crate::beam::Optics;
 use crate::beam::design::readings;
 use crate::{BasisSpec, BeamRows, FitError, Influence, Penalised, Penalty, Ray, Region, Weighed};
 use radiometry::DomainError;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A value with its combined standard uncertainty (k = 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,6 +165,8 @@ impl Fit {
 
     /// The exitance M = ∫ L cos θ dω over the whole hemisphere, mean over the region, in the
     /// values' unit times sr: of Zernike polynomials c₀ √π. Beyond what was measured it is extrapolated.
+    /// In charts other than the surface one it is no exitance but the flux over the region's area,
+    /// or at the point of an environment the spherical irradiance ∫ L dω.
     pub fn exitance(&self) -> Estimate {
         self.estimate(self.basis.exitance())
     }
@@ -177,7 +179,9 @@ impl Fit {
 
     /// The exitance within the region's own cone, mean over the region: what rests on measurement.
     pub fn exitance_within_region(&self) -> Estimate {
-        let theta_max_rad = self.region().theta_max_rad.min(FRAC_PI_2);
+        let is_whole = self.region().chart.is_whole_sphere();
+        let end_rad = if is_whole { PI } else { FRAC_PI_2 };
+        let theta_max_rad = self.region().theta_max_rad.min(end_rad);
         let within = self.basis.exitance_within(theta_max_rad);
         self.estimate(within.as_deref().unwrap_or(self.basis.exitance()))
     }
@@ -188,10 +192,12 @@ impl Fit {
     }
 
     /// The intensity of the region as a whole in a direction: ∫ L cos θ dA, in the values' unit
-    /// times m².
+    /// times m²; of an object ∫ L dA over the plane across the direction.
     pub fn intensity(&self, theta_rad: f64, phi_rad: f64) -> Estimate {
         let mean = self.estimate(&self.basis.mean_over_region(theta_rad, phi_rad));
-        mean.times(self.region().area_m2() * libm::cos(theta_rad))
+        let is_whole = self.region().chart.is_whole_sphere();
+        let projection = if is_whole { 1.0 } else { libm::cos(theta_rad) };
+        mean.times(self.region().area_m2() * projection)
     }
 
     /// The exitance within the region's cone over that of the hemisphere: how much of the latter

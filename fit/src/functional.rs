@@ -110,6 +110,12 @@ impl Fit {
         Functional { row: self.functions().mean_over_region(theta_rad, phi_rad) }
     }
 
+    /// The flux in all directions of the chart, as a functional: from the region, through both
+    /// rectangles of two planes.
+    pub(crate) fn throughput_sum(&self) -> Functional {
+        Functional { row: self.functions().exitance().to_vec() }.times(self.region().area_m2())
+    }
+
     /// The functional's value with its uncertainty, in the values' unit times the weights'.
     ///
     /// # Panics

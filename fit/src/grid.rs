@@ -21,7 +21,8 @@ impl Grid {
         let position_apart_m = POSITION_APART * region.margin_m();
         let theta_max = rays().map(|ray| ray.theta_rad).fold(0.0, f64::max);
         let off_pole = (OFF_POLE_SHARE * theta_max).clamp(ANGLE_APART_RAD, OFF_POLE_RAD);
-        let lines = rays().filter(|ray| ray.theta_rad > off_pole);
+        // Over the whole sphere there is a pole below, too.
+        let lines = rays().filter(|ray| ray.theta_rad.min(PI - ray.theta_rad) > off_pole);
         Self {
             x_m: distinct(rays().map(|ray| ray.x_m), position_apart_m),
             y_m: distinct(rays().map(|ray| ray.y_m), position_apart_m),

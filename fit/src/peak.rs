@@ -35,7 +35,7 @@ impl Fit {
     /// The best places of the grid, a few of them so that a second lobe has its chance.
     fn starts(&self) -> Vec<Place> {
         let basis = self.functions();
-        let directions = directions(self.region().theta_max_rad, basis.directions().fineness());
+        let directions = directions(self.region(), basis.directions().fineness());
         let mut z = vec![0.0; basis.angular_len()];
         let mut folded = vec![0.0; basis.angular_len()];
         let mut scratch = basis.scratch();
@@ -52,7 +52,7 @@ impl Fit {
             for &(u, v) in &directions {
                 let place = Place { u, v, a, b };
                 let ray = place.ray(self.region());
-                basis.direction(ray.theta_rad, ray.phi_rad, &mut scratch, &mut z);
+                basis.direction_of(&ray, &mut scratch, &mut z);
                 keep(&mut starts, place, dot(&folded, &z));
             }
         }
@@ -63,7 +63,7 @@ impl Fit {
     fn climb(&self, start: Place) -> (Place, f64) {
         let basis = self.functions();
         let mut scratch = basis.scratch();
-        let r_max = libm::sin(self.region().theta_max_rad);
+        let r_max = disk_radius(self.region(), self.region().theta_max_rad);
         let mut at = |place: Place| {
             basis.value(self.coefficients(), &place.ray(self.region()), &mut scratch)
         };
@@ -85,7 +85,8 @@ impl Fit {
     }
 }
 
-/// A ray by its point on the Nusselt disk and its position scaled to [-1, 1]².
+/// A ray by its point on the Nusselt disk (of the whole sphere on the equal-area disk, half as far
+/// out) and its position scaled to [-1, 1]².
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
     u: f64,
@@ -102,7 +103,7 @@ impl Place {
         Ray {
             x_m: between(self.a, region.x_m),
             y_m: between(self.b, region.y_m),
-            theta_rad: libm::asin(libm::hypot(self.u, self.v).min(1.0)),
+            theta_rad: theta_of(region, libm::hypot(self.u, self.v)),
             phi_rad: libm::atan2(self.v, self.u),
         }
     }
@@ -145,18 +146,28 @@ impl Place {
 
 /// Points on the disk within the cone, the centre first, rings outwards; dense at the rim, where
 /// polynomials turn fastest.
-fn directions(theta_max_rad: f64, degree: usize) -> Vec<(f64, f64)> {
+fn directions(region: &Region, degree: usize) -> Vec<(f64, f64)> {
     let rings = 2 * (degree + 1);
     let spokes = 4 * (degree + 1);
     let mut points = vec![(0.0, 0.0)];
     for ring in 1..=rings {
-        let r = libm::sin(theta_max_rad * ring as f64 / rings as f64);
+        let r = disk_radius(region, region.theta_max_rad * ring as f64 / rings as f64);
         for spoke in 0..spokes {
             let (sin, cos) = libm::sincos(TAU * spoke as f64 / spokes as f64);
             points.push((r * cos, r * sin));
         }
     }
     points
+}
+
+/// Where a direction lies on the disk.
+fn disk_radius(region: &Region, theta_rad: f64) -> f64 {
+    if region.chart.is_whole_sphere() { libm::sin(0.5 * theta_rad) } else { libm::sin(theta_rad) }
+}
+
+fn theta_of(region: &Region, radius: f64) -> f64 {
+    let angle_rad = libm::asin(radius.min(1.0));
+    if region.chart.is_whole_sphere() { 2.0 * angle_rad } else { angle_rad }
 }
 
 /// Positions in [-1, 1]², the centre first.

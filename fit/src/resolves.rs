@@ -5,8 +5,8 @@ use crate::basis::{Angular, BasisSpec, Position};
 use crate::beam::Optics;
 use crate::choice::{SweepKind, Sweeps};
 use crate::grid::Grid;
-use crate::{Ray, Region, Sample};
-use std::f64::consts::{PI, TAU};
+use crate::{Chart, Ray, Region, Sample};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// What keeps a narrower feature from being seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,13 +67,13 @@ impl Resolves {
         let measured_to_rad = samples.iter().map(|s| s.ray.theta_rad).fold(0.0, f64::max);
         let grid = Grid::of(samples, region);
         let (theta_gap, phi_gap) = gaps(samples, region, &grid, measured_to_rad);
-        let (theta_basis, phi_basis) = bends(basis.angular);
+        let (theta_basis, phi_basis) = bends(basis.angular, region);
         let (angle, spot) = optics.map_or((0.0, 0.0), |optics| {
             let beam = &optics.beam;
             let radii = beam.stop_radius_m() + beam.pupil_radius_m();
             (radii / beam.separation_m(), 2.0 * beam.stop_radius_m())
         });
-        let edge = libm::sin(measured_to_rad);
+        let edge = libm::sin(measured_to_rad.min(FRAC_PI_2));
         let side = |(from, to): (f64, f64), places: &[f64]| {
             let bend = match basis.position {
                 Position::Legendre { degree: 0 } => return None,
@@ -103,14 +103,25 @@ fn largest(basis: f64, sampling: f64, beam: f64) -> Width {
 }
 
 /// Half a period of the fastest function in θ, and round the horizon; of splines the width of one.
-fn bends(angular: Angular) -> (f64, f64) {
+fn bends(angular: Angular, region: &Region) -> (f64, f64) {
     let period = |n: usize| if n == 0 { f64::INFINITY } else { PI / n as f64 };
     match angular {
         Angular::Zernike { degree, cosine_columns } => {
             // With a few columns of cos θ alone θ is followed as far as they go.
             (period(degree.max(2 * cosine_columns)), period(degree))
         }
-        Angular::EvenHarmonics { degree } => (period(degree), period(degree)),
+        Angular::EvenHarmonics { degree } | Angular::Spherical { degree } => {
+            (period(degree), period(degree))
+        }
+        Angular::SecondPlane { degree } => {
+            // As an angle seen from the first plane.
+            let Chart::TwoPlane { distance_m, s_m, t_m } = region.chart else {
+                return (f64::INFINITY, f64::INFINITY);
+            };
+            let widest_m = (s_m.1 - s_m.0).max(t_m.1 - t_m.0);
+            let bend = widest_m / degree as f64 / distance_m;
+            (bend, bend / libm::sin(region.theta_max_rad))
+        }
         // A quarter turn of θ is half a turn of theirs.
         Angular::Hemispherical { degree } => (period(degree) / 2.0, period(degree)),
         Angular::Splines { theta_spans, phi_spans } => {
@@ -127,7 +138,7 @@ fn gaps(samples: &[Sample], region: &Region, grid: &Grid, theta_to: f64) -> (f64
         // A line through the normal has readings on both sides or on one.
         let mut azimuths: Vec<f64> = samples
             .iter()
-            .filter(|s| s.ray.theta_rad > 0.5 * theta_to)
+            .filter(|s| libm::sin(s.ray.theta_rad) > libm::sin(0.5 * theta_to.min(FRAC_PI_2)))
             .map(|s| s.ray.phi_rad.rem_euclid(TAU))
             .collect();
         azimuths.sort_by(f64::total_cmp);
@@ -137,7 +148,7 @@ fn gaps(samples: &[Sample], region: &Region, grid: &Grid, theta_to: f64) -> (f64
         return (theta, phi);
     }
     let hole = hole(samples, region);
-    (hole, hole / libm::sin(theta_to).max(f64::MIN_POSITIVE))
+    (hole, hole / libm::sin(theta_to.min(FRAC_PI_2)).max(f64::MIN_POSITIVE))
 }
 
 /// The widest step between neighbours; from an end to the first of them counts twice.

@@ -126,28 +126,78 @@ impl Region {
             && self.theta_max_rad > 0.0
             && self.theta_max_rad <= self.chart.theta_end_rad()
             && self.chart.is_sound()
-            // No basis has functions of the others yet.
-            && self.chart == Chart::Surface
     }
 
     /// How far outside the rectangle a measured position may lie, metres: a readback is never
     /// exactly the position asked for, and a polynomial bears that much.
     pub(crate) fn margin_m(&self) -> f64 {
-        let half_width_m = 0.5 * (self.x_m.1 - self.x_m.0).max(self.y_m.1 - self.y_m.0);
-        if half_width_m > 0.0 { MARGIN_RELATIVE * half_width_m } else { MARGIN_OF_A_POINT_M }
+        margin_m(self.x_m, self.y_m)
+    }
+
+    /// Where a ray that misses the second rectangle pierces its plane; `None` of one that doesn't,
+    /// and where there is no such plane.
+    pub(crate) fn missed_second_plane(&self, ray: &Ray) -> Option<(f64, f64)> {
+        let Chart::TwoPlane { distance_m, s_m, t_m } = self.chart else { return None };
+        let (s, t) = ray.beyond(distance_m);
+        let margin_m = margin_m(s_m, t_m);
+        let within = |at: f64, (from, to): (f64, f64)| at >= from - margin_m && at <= to + margin_m;
+        (!within(s, s_m) || !within(t, t_m)).then_some((s, t))
     }
 
     /// Whether the position lies in the rectangle, or within its margin.
     pub(crate) fn holds(&self, ray: &Ray) -> bool {
         let margin_m = self.margin_m();
         let within = |t: f64, (from, to): (f64, f64)| t >= from - margin_m && t <= to + margin_m;
-        within(ray.x_m, self.x_m) && within(ray.y_m, self.y_m)
+        let is_in_face = match self.chart {
+            Chart::Perpendicular { face: Face::Disk } => {
+                let radius_m = 0.5 * (self.x_m.1 - self.x_m.0);
+                let (x, y) =
+                    (f64::midpoint(self.x_m.0, self.x_m.1), f64::midpoint(self.y_m.0, self.y_m.1));
+                libm::hypot(ray.x_m - x, ray.y_m - y) <= radius_m + margin_m
+            }
+            _ => true,
+        };
+        is_in_face && within(ray.x_m, self.x_m) && within(ray.y_m, self.y_m)
+    }
+
+    /// Whether something was to be measured along the ray: within the places, and the cone or the
+    /// second rectangle.
+    pub fn covers(&self, ray: &Ray) -> bool {
+        self.holds(ray)
+            && ray.theta_rad <= self.theta_max_rad + ROUNDING_RAD
+            && self.missed_second_plane(ray).is_none()
     }
 
     /// The position in the rectangle mapped to [-1, 1]²; 0 along a side without length.
     pub(crate) fn scaled(&self, ray: &Ray) -> (f64, f64) {
         (scale(ray.x_m, self.x_m), scale(ray.y_m, self.y_m))
     }
+}
+
+impl Ray {
+    /// The ray from (u, v) in z = 0 through (s, t) in z = `distance_m`, above 0.
+    pub fn between((u_m, v_m): (f64, f64), (s_m, t_m): (f64, f64), distance_m: f64) -> Self {
+        let (x, y) = (s_m - u_m, t_m - v_m);
+        Self {
+            x_m: u_m,
+            y_m: v_m,
+            theta_rad: libm::atan2(libm::hypot(x, y), distance_m),
+            phi_rad: libm::atan2(y, x),
+        }
+    }
+
+    /// Where it pierces the plane z = `distance_m`, metres; very far off along the plane.
+    pub fn beyond(&self, distance_m: f64) -> (f64, f64) {
+        let across_m = distance_m * libm::tan(self.theta_rad);
+        let (sin, cos) = libm::sincos(self.phi_rad);
+        (self.x_m + across_m * cos, self.y_m + across_m * sin)
+    }
+}
+
+/// Of a rectangle.
+fn margin_m(x_m: (f64, f64), y_m: (f64, f64)) -> f64 {
+    let half_width_m = 0.5 * (x_m.1 - x_m.0).max(y_m.1 - y_m.0);
+    if half_width_m > 0.0 { MARGIN_RELATIVE * half_width_m } else { MARGIN_OF_A_POINT_M }
 }
 
 fn scale(t: f64, (from, to): (f64, f64)) -> f64 {
@@ -157,6 +207,8 @@ fn scale(t: f64, (from, to): (f64, f64)) -> f64 {
 
 /// The largest angle from the normal, radians, with room for a conversion's rounding.
 pub(crate) const HORIZON_RAD: f64 = std::f64::consts::FRAC_PI_2 + 1e-9;
+/// An angle's rounding.
+const ROUNDING_RAD: f64 = 1e-9;
 /// Share of the larger half width. A Legendre polynomial of degree 4 grows by a third over it.
 const MARGIN_RELATIVE: f64 = 0.02;
 /// Where the region is one point: a tenth of a millimetre, what a stage's readback may be off.

@@ -167,7 +167,7 @@ fn causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
 fn angular_causes(rays: &[Ray], grid: &Grid, basis: &Basis) -> Vec<Cause> {
     let terms = basis.angular_len();
     let rank = rank(rays, terms, basis, |ray, scratch, row| {
-        basis.direction(ray.theta_rad, ray.phi_rad, scratch, row);
+        basis.direction_of(ray, scratch, row);
     });
     if rank == terms {
         return Vec::new();

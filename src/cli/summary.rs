@@ -200,6 +200,8 @@ fn basis_in_words(basis: BasisSpec) -> String {
             format!("Zernike of degree {degree} and {cosine_columns} of cos θ")
         }
         Angular::Hemispherical { degree } => format!("hemispherical harmonics of degree {degree}"),
+        Angular::Spherical { degree } => format!("spherical harmonics of degree {degree}"),
+        Angular::SecondPlane { degree } => format!("Legendre in s and t of degree {degree}"),
         Angular::EvenHarmonics { degree } => format!("even harmonics of degree {degree}"),
         Angular::Splines { theta_spans, phi_spans } => {
             format!("splines of {theta_spans} spans in θ, {phi_spans} round the horizon")

@@ -174,7 +174,10 @@ fn budget(rows: &[Contribution]) -> Value {
 fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
     let (cosine_columns, spans) = match spec.angular {
         Angular::Zernike { cosine_columns, .. } => (Some(cosine_columns), None),
-        Angular::Hemispherical { .. } | Angular::EvenHarmonics { .. } => (None, None),
+        Angular::Hemispherical { .. }
+        | Angular::EvenHarmonics { .. }
+        | Angular::Spherical { .. }
+        | Angular::SecondPlane { .. } => (None, None),
         Angular::Splines { theta_spans, phi_spans } => (None, Some((theta_spans, phi_spans))),
     };
     let position_spans = match spec.position {
@@ -186,6 +189,8 @@ fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
         Angular::Hemispherical { .. } => "hemispherical harmonics",
         Angular::EvenHarmonics { .. } => "even spherical harmonics",
         Angular::Splines { .. } => "cubic B-splines in theta and phi",
+        Angular::Spherical { .. } => "spherical harmonics",
+        Angular::SecondPlane { .. } => "Legendre in s and t",
     };
     let position = if position_spans.is_some() { "cubic B-splines" } else { "Legendre" };
     let mut basis = json!({

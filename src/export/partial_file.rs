@@ -123,6 +123,8 @@ enum AngularHeader {
     Hemispherical { degree: usize },
     EvenHarmonics { degree: usize },
     Splines { theta_spans: usize, phi_spans: usize },
+    Spherical { degree: usize },
+    SecondPlane { degree: usize },
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -347,6 +349,8 @@ impl BasisHeader {
             Angular::Splines { theta_spans, phi_spans } => {
                 AngularHeader::Splines { theta_spans, phi_spans }
             }
+            Angular::Spherical { degree } => AngularHeader::Spherical { degree },
+            Angular::SecondPlane { degree } => AngularHeader::SecondPlane { degree },
         };
         let position = match spec.position {
             Position::Legendre { degree } => PositionHeader::Legendre { degree },
@@ -365,6 +369,8 @@ impl BasisHeader {
             AngularHeader::Splines { theta_spans, phi_spans } => {
                 Angular::Splines { theta_spans, phi_spans }
             }
+            AngularHeader::Spherical { degree } => Angular::Spherical { degree },
+            AngularHeader::SecondPlane { degree } => Angular::SecondPlane { degree },
         };
         let position = match self.position {
             PositionHeader::Legendre { degree } => Position::Legendre { degree },

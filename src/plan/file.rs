@@ -381,7 +381,7 @@ fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
         Ok(degree.map(|degree| usize::try_from(degree).unwrap_or_default()))
     };
     let fit = Wish {
-        kind: table.choice("basis", &AngularKind::ALL.map(|kind| (kind.name(), kind)))?,
+        kind: table.choice("basis", &AngularKind::OF_SURFACE.map(|kind| (kind.name(), kind)))?,
         angular_degree: degree("angular_degree", ANGULAR_DEGREE_MAX)?,
         position_degree: degree("position_degree", POSITION_DEGREE_MAX)?,
         penalty_power: table.number("penalty_power", PENALTY_POWER)?,

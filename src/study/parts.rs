@@ -176,7 +176,9 @@ fn nodes_of_fit(fit: &Fit) -> Vec<(Ray, f64)> {
     let degree = match fit.basis().angular {
         Angular::Zernike { degree, .. }
         | Angular::Hemispherical { degree }
-        | Angular::EvenHarmonics { degree } => degree,
+        | Angular::EvenHarmonics { degree }
+        | Angular::Spherical { degree }
+        | Angular::SecondPlane { degree } => degree,
         Angular::Splines { theta_spans, phi_spans } => theta_spans.max(phi_spans),
     };
     let places = match fit.basis().position {

@@ -1,13 +1,14 @@
 //! The functions of the direction, ready to be evaluated: one face for every kind of them.
 
 use super::Angular;
+use super::plane::SecondPlane;
 use super::splines::PolarSplines;
-use crate::FitError;
+use crate::{Chart, FitError};
 use glam::DVec3;
+use radiometry::DomainError;
 use radiometry::basis::zernike::ansi_order;
 use radiometry::basis::{HemisphericalHarmonics, SphericalHarmonics, Zernike};
 use radiometry::quadrature::gauss_legendre;
-use radiometry::{DomainError, direction};
 use std::f64::consts::{PI, TAU};
 
 /// The functions of a kind.
@@ -25,6 +26,9 @@ pub(crate) enum Directions {
         even: Vec<usize>,
     },
     Splines(PolarSplines),
+    Spherical(SphericalHarmonics),
+    /// Functions of the ray: see [`super::Basis::direction_of`].
+    SecondPlane(SecondPlane),
 }
 
 /// cos θ times Zernike polynomials of order 0.
@@ -35,8 +39,12 @@ pub(crate) struct Cosine {
 }
 
 impl Directions {
-    pub(crate) fn new(angular: Angular) -> Result<Self, FitError> {
+    pub(crate) fn new(angular: Angular, chart: Chart) -> Result<Self, FitError> {
         let refused = |_: DomainError| FitError::Basis { kind: angular.name() };
+        let foreign = || FitError::BasisOfChart { kind: angular.name(), chart: chart.name() };
+        if !angular.is_of(&chart) {
+            return Err(foreign());
+        }
         Ok(match angular {
             Angular::Zernike { degree, cosine_columns } => Self::Zernike {
                 zernike: Zernike::new(degree),
@@ -54,6 +62,12 @@ impl Directions {
             Angular::Splines { theta_spans, phi_spans } => {
                 Self::Splines(PolarSplines::new(theta_spans, phi_spans).map_err(refused)?)
             }
+            Angular::Spherical { degree } => {
+                Self::Spherical(SphericalHarmonics::new(degree).map_err(refused)?)
+            }
+            Angular::SecondPlane { degree } => {
+                Self::SecondPlane(SecondPlane::new(degree, chart)?.ok_or_else(foreign)?)
+            }
         })
     }
 
@@ -65,6 +79,16 @@ impl Directions {
             Self::Hemispherical(harmonics) => harmonics.len(),
             Self::Even { even, .. } => even.len(),
             Self::Splines(splines) => splines.len(),
+            Self::Spherical(harmonics) => harmonics.len(),
+            Self::SecondPlane(plane) => plane.len(),
+        }
+    }
+
+    /// The functions of the place in the second plane.
+    pub(crate) fn second_plane(&self) -> Option<&SecondPlane> {
+        match self {
+            Self::SecondPlane(plane) => Some(plane),
+            _ => None,
         }
     }
 
@@ -92,10 +116,14 @@ impl Directions {
                 out.iter_mut().zip(even).for_each(|(out, k)| *out = room[*k]);
             }
             Self::Splines(splines) => splines.evaluate_direction(d, out),
+            Self::Spherical(harmonics) => harmonics.evaluate(d, out),
+            // From the middle of the first plane, for want of a place.
+            Self::SecondPlane(plane) => plane.evaluate((0.0, 0.0), d, &mut plane.lines(), out),
         }
     }
 
-    /// ∫ cos θ dω of every function over the cone.
+    /// ∫ cos θ dω of every function over the cone; of those over the whole sphere ∫ dω. Functions
+    /// of the second plane have none.
     pub(crate) fn integrals_within(
         &self,
         theta_max_rad: f64,
@@ -108,8 +136,12 @@ impl Directions {
                 // In closed form where there is one.
                 zernike.integrals_within(theta_max_rad, &mut out[..zernike.len()])
             }
-            Self::Hemispherical(_) | Self::Even { .. } => {
+            Self::Hemispherical(_) | Self::Even { .. } | Self::Spherical(_) => {
                 self.integrate_rounds(theta_max_rad, out);
+                Ok(())
+            }
+            Self::SecondPlane(_) => {
+                out.fill(0.0);
                 Ok(())
             }
             Self::Splines(splines) => splines.integrals_within(theta_max_rad, out),
@@ -120,16 +152,18 @@ impl Directions {
     /// rounding; the others have none.
     fn integrate_rounds(&self, theta_max_rad: f64, out: &mut [f64]) {
         out.fill(0.0);
-        let low = libm::cos(theta_max_rad).max(0.0);
+        let is_whole = matches!(self, Self::Spherical(_));
+        let low = libm::cos(theta_max_rad).max(if is_whole { -1.0 } else { 0.0 });
         let (middle, half) = (f64::midpoint(low, 1.0), (1.0 - low) / 2.0);
         let (mut values, mut room) = (vec![0.0; self.len()], self.room());
         for (node, weight) in gauss_legendre(self.trigonometric_degree() / 2 + 2) {
             let cos = middle + half * node;
             let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
             self.evaluate(DVec3::new(sin, 0.0, cos), &mut room, &mut values);
+            let projected = if is_whole { 1.0 } else { cos };
             for (k, (out, value)) in out.iter_mut().zip(&values).enumerate() {
                 if self.order(k) == 0 {
-                    *out += TAU * weight * half * cos * value;
+                    *out += TAU * weight * half * projected * value;
                 }
             }
         }
@@ -141,10 +175,11 @@ impl Directions {
         match self {
             Self::Zernike { zernike, .. } if k < zernike.len() => ansi_order(k),
             Self::Zernike { zernike, .. } => (2 * (k - zernike.len()) + 1, 0),
-            Self::Hemispherical(_) => {
+            Self::Hemispherical(_) | Self::Spherical(_) => {
                 let l = k.isqrt();
                 (l, signed(k) - signed(l * (l + 1)))
             }
+            Self::SecondPlane(plane) => (plane.degree_of(k), 0),
             Self::Even { even, .. } => {
                 let l = even[k].isqrt();
                 (l, signed(even[k]) - signed(l * (l + 1)))
@@ -171,17 +206,18 @@ impl Directions {
                 zernike.degree().max(cosine.as_ref().map_or(0, |c| 2 * c.columns))
             }
             Self::Hemispherical(harmonics) => 2 * harmonics.len().isqrt(),
-            Self::Even { all, .. } => all.degree(),
+            Self::Even { all, .. } | Self::Spherical(all) => all.degree(),
             Self::Splines(splines) => splines.fineness(),
+            Self::SecondPlane(plane) => plane.degree(),
         }
     }
 
-    /// The degree along any great circle of every field that is as large below the horizon as above
-    /// it; `None` where that is not so, and a bound can't rest on it.
+    /// The degree along any great circle of every field that is no larger below the horizon than
+    /// above it, or that the whole sphere has; `None` where that is not so, and a bound can't rest on it.
     pub(crate) fn mirrored_degree(&self) -> Option<usize> {
         match self {
             Self::Zernike { zernike, cosine: None } => Some(zernike.degree()),
-            Self::Even { all, .. } => Some(all.degree()),
+            Self::Even { all, .. } | Self::Spherical(all) => Some(all.degree()),
             _ => None,
         }
     }
@@ -189,9 +225,11 @@ impl Directions {
     /// How fine a grid has to be that no lobe slips through: as for polynomials of this degree.
     pub(crate) fn fineness(&self) -> usize {
         match self {
-            Self::Zernike { .. } | Self::Even { .. } | Self::Splines(_) => {
-                self.trigonometric_degree()
-            }
+            Self::Zernike { .. }
+            | Self::Even { .. }
+            | Self::Splines(_)
+            | Self::Spherical(_)
+            | Self::SecondPlane(_) => self.trigonometric_degree(),
             Self::Hemispherical(harmonics) => harmonics.len().isqrt() - 1,
         }
     }
@@ -218,7 +256,11 @@ impl Directions {
                 let degree = harmonics.len().isqrt() - 1;
                 Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
             }
-            Self::Splines(_) => None,
+            Self::Spherical(harmonics) => {
+                let degree = harmonics.degree();
+                Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
+            }
+            Self::Splines(_) | Self::SecondPlane(_) => None,
         }
     }
 
@@ -228,7 +270,8 @@ impl Directions {
         match self {
             Self::Zernike { .. } => out[0] = PI.sqrt(),
             Self::Hemispherical(_) => out[0] = TAU.sqrt(),
-            Self::Even { .. } => out[0] = (2.0 * TAU).sqrt(),
+            Self::Even { .. } | Self::Spherical(_) => out[0] = (2.0 * TAU).sqrt(),
+            Self::SecondPlane(_) => out[0] = 1.0,
             Self::Splines(splines) => splines.unity(out),
         }
     }
@@ -246,26 +289,23 @@ impl Directions {
             Self::Zernike { .. } => (degree / PI).sqrt(),
             // By the addition theorem all of a degree have squares that sum to (2l+1)/4π.
             Self::Hemispherical(_) => ((2.0 * degree + 1.0) / TAU).sqrt(),
-            Self::Even { .. } => ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt(),
+            Self::Even { .. } | Self::Spherical(_) => ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt(),
+            Self::SecondPlane(plane) => plane.largest(k),
             Self::Splines(_) => 1.0,
         }
     }
 
-    /// `Z(n,m)`, `cos Z(n,0)`, `H(l,m)`, `Y(l,m)`, or where a spline is centred.
+    /// `Z(n,m)`, `cos Z(n,0)`, `H(l,m)`, `Y(l,m)`, `P1(s)`, or where a spline is centred.
     pub(crate) fn name(&self, k: usize) -> String {
         let (n, m) = self.degree_and_order(k);
         match self {
             Self::Zernike { zernike, .. } if k < zernike.len() => format!("Z({n},{m})"),
             Self::Zernike { .. } => format!("cos Z({},0)", n - 1),
             Self::Hemispherical(_) => format!("H({n},{m})"),
-            Self::Even { .. } => format!("Y({n},{m})"),
+            Self::Even { .. } | Self::Spherical(_) => format!("Y({n},{m})"),
+            Self::SecondPlane(plane) => plane.name(k),
             Self::Splines(splines) => splines.name(k),
         }
-    }
-
-    /// As [`evaluate`](Self::evaluate), by angles.
-    pub(crate) fn evaluate_angles(&self, theta: f64, phi: f64, room: &mut [f64], out: &mut [f64]) {
-        self.evaluate(direction::unit(theta, phi), room, out);
     }
 }
 

@@ -7,16 +7,18 @@
 
 mod angular;
 mod place;
+mod plane;
 mod spec;
 mod splines;
 
 use crate::{FitError, Ray, Region};
 use glam::DVec3;
 use radiometry::{DomainError, direction};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 pub(crate) use angular::Directions;
 pub(crate) use place::Places;
+pub(crate) use plane::SecondPlane;
 pub use spec::{Angular, BasisSpec, Position};
 pub(crate) use splines::{Derivative, PolarSplines};
 
@@ -27,7 +29,7 @@ pub(crate) struct Basis {
     places: Places,
     region: Region,
     spec: BasisSpec,
-    /// Of every function, over the hemisphere.
+    /// Of every function, over all directions of the chart.
     exitance: Vec<f64>,
 }
 
@@ -37,6 +39,8 @@ pub(crate) struct Scratch {
     direction: Vec<f64>,
     room: Vec<f64>,
     lines: [Vec<f64>; 2],
+    /// Of the second plane.
+    beyond: [Vec<f64>; 2],
     position: Vec<f64>,
 }
 
@@ -49,11 +53,15 @@ impl Scratch {
 
 impl Basis {
     pub(crate) fn new(spec: BasisSpec, region: Region) -> Result<Self, FitError> {
-        let directions = Directions::new(spec.angular)?;
+        let directions = Directions::new(spec.angular, region.chart)?;
         let places = Places::new(spec.position, &region)?;
         let mut new = Self { directions, places, region, spec, exitance: Vec::new() };
         let refused = |_: DomainError| FitError::Basis { kind: spec.angular.name() };
-        new.exitance = new.exitance_within(FRAC_PI_2).map_err(refused)?;
+        let end_rad = if region.chart.is_whole_sphere() { PI } else { FRAC_PI_2 };
+        new.exitance = match new.directions.second_plane() {
+            Some(plane) => plane.throughput(&new.places, &region)?,
+            None => new.exitance_within(end_rad).map_err(refused)?,
+        };
         Ok(new)
     }
 
@@ -91,16 +99,54 @@ impl Basis {
             direction: vec![0.0; self.angular_len()],
             room: self.directions.room(),
             lines: [vec![0.0; x], vec![0.0; y]],
+            beyond: self.directions.second_plane().map(SecondPlane::lines).unwrap_or_default(),
             position: vec![0.0; self.places.len()],
         }
     }
 
-    /// The functions of the direction along an angle.
-    pub(crate) fn direction(&self, theta: f64, phi: f64, scratch: &mut Scratch, out: &mut [f64]) {
-        self.direction_along(direction::unit(theta, phi), scratch, out);
+    /// Whether a function of the direction needs the place as well: then a row is a product of both
+    /// at each ray, but no average over places times one over directions.
+    pub(crate) fn is_joint(&self) -> bool {
+        self.directions.second_plane().is_some()
     }
 
-    /// As [`direction`](Self::direction), at a unit vector.
+    /// The functions of the direction along a ray.
+    pub(crate) fn direction_of(&self, ray: &Ray, scratch: &mut Scratch, out: &mut [f64]) {
+        let d = direction::unit(ray.theta_rad, ray.phi_rad);
+        self.direction_from((ray.x_m, ray.y_m), d, scratch, out);
+    }
+
+    fn direction_from(
+        &self,
+        place_m: (f64, f64),
+        d: DVec3,
+        scratch: &mut Scratch,
+        out: &mut [f64],
+    ) {
+        match self.directions.second_plane() {
+            Some(plane) => plane.evaluate(place_m, d, &mut scratch.beyond, out),
+            None => self.directions.evaluate(d, &mut scratch.room, out),
+        }
+    }
+
+    /// All functions along the ray from a place, continued beyond the region.
+    pub(crate) fn row_from(
+        &self,
+        place_m: (f64, f64),
+        d: DVec3,
+        scratch: &mut Scratch,
+        out: &mut [f64],
+    ) {
+        let mut along = std::mem::take(&mut scratch.direction);
+        self.direction_from(place_m, d, scratch, &mut along);
+        self.position_continued(place_m.0, place_m.1, scratch);
+        for (p, block) in scratch.position.iter().zip(out.chunks_exact_mut(along.len())) {
+            block.iter_mut().zip(&along).for_each(|(out, z)| *out = p * z);
+        }
+        scratch.direction = along;
+    }
+
+    /// The functions of the direction at a unit vector, wherever the ray begins.
     pub(crate) fn direction_along(&self, d: DVec3, scratch: &mut Scratch, out: &mut [f64]) {
         self.directions.evaluate(d, &mut scratch.room, out);
     }
@@ -150,20 +196,26 @@ impl Basis {
     }
 
     fn evaluate(&self, ray: &Ray, scratch: &mut Scratch) {
-        let Scratch { direction, room, .. } = scratch;
-        self.directions.evaluate_angles(ray.theta_rad, ray.phi_rad, room, direction);
+        let mut along = std::mem::take(&mut scratch.direction);
+        self.direction_of(ray, scratch, &mut along);
+        scratch.direction = along;
         self.position(ray, scratch);
     }
 
     /// The exitance within a cone about the normal, mean over the region, as a linear functional:
-    /// the sum of its elements times the coefficients.
+    /// the sum of its elements times the coefficients. Over the whole sphere without the cosine;
+    /// between two planes all of it, whatever the angle.
     pub(crate) fn exitance_within(&self, theta_max_rad: f64) -> Result<Vec<f64>, DomainError> {
+        if self.is_joint() {
+            return Ok(self.exitance.clone());
+        }
         let mut over_cone = vec![0.0; self.angular_len()];
         self.directions.integrals_within(theta_max_rad, &mut over_cone)?;
         Ok(self.over_region(&over_cone))
     }
 
-    /// The exitance of the whole hemisphere, mean over the region.
+    /// The exitance of the whole hemisphere, mean over the region; in other charts the flux in all
+    /// their directions over the region's area.
     pub(crate) fn exitance(&self) -> &[f64] {
         &self.exitance
     }
@@ -176,10 +228,14 @@ impl Basis {
         self.product(unity, &everywhere)
     }
 
-    /// The mean over the region of the value in a direction, as a linear functional.
+    /// The mean over the region of the value in a direction, as a linear functional. Of functions that
+    /// need the place as well those from the region's middle count.
     pub(crate) fn mean_over_region(&self, theta_rad: f64, phi_rad: f64) -> Vec<f64> {
         let mut values = vec![0.0; self.angular_len()];
-        self.direction(theta_rad, phi_rad, &mut self.scratch(), &mut values);
+        let Region { x_m, y_m, .. } = self.region;
+        let (x_m, y_m) = (f64::midpoint(x_m.0, x_m.1), f64::midpoint(y_m.0, y_m.1));
+        let ray = Ray { x_m, y_m, theta_rad, phi_rad };
+        self.direction_of(&ray, &mut self.scratch(), &mut values);
         self.over_region(&values)
     }
 

@@ -1,9 +1,10 @@
 //! The functions of the place on the sample, ready to be evaluated.
 
 use super::Position;
-use crate::{FitError, Ray, Region};
+use crate::{Chart, Face, FitError, Ray, Region};
 use radiometry::DomainError;
 use radiometry::basis::{BSpline, Legendre};
+use radiometry::beam::disk_rule;
 
 /// Products of functions of x and of y.
 #[derive(Debug, Clone)]
@@ -11,7 +12,8 @@ pub(crate) struct Places {
     along: (Line, Line),
     /// Which function of x times which of y.
     terms: Vec<(usize, usize)>,
-    means: (Vec<f64>, Vec<f64>),
+    /// Of every term, over the region.
+    means: Vec<f64>,
     position: Position,
 }
 
@@ -38,8 +40,17 @@ impl Places {
                 (0..nx).flat_map(|x| (0..ny).map(move |y| (x, y))).collect()
             }
         };
-        let means = (along.0.means().map_err(refused)?, along.1.means().map_err(refused)?);
-        Ok(Self { along, terms, means, position })
+        let mut new = Self { along, terms, means: Vec::new(), position };
+        new.means = match (region.chart, position) {
+            (Chart::Perpendicular { face: Face::Disk }, Position::Legendre { degree }) => {
+                new.means_over_disk(degree)
+            }
+            (Chart::Perpendicular { face: Face::Disk }, Position::Splines { .. }) => {
+                return Err(FitError::Basis { kind: "position splines over a disk" });
+            }
+            _ => new.means_over_square().map_err(refused)?,
+        };
+        Ok(new)
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -62,8 +73,28 @@ impl Places {
 
     /// The mean over the region of a term.
     pub(crate) fn mean(&self, q: usize) -> f64 {
-        let (a, b) = self.terms[q];
-        self.means.0[a] * self.means.1[b]
+        self.means[q]
+    }
+
+    fn means_over_square(&self) -> Result<Vec<f64>, DomainError> {
+        let (x, y) = (self.along.0.means()?, self.along.1.means()?);
+        Ok(self.terms.iter().map(|&(a, b)| x[a] * y[b]).collect())
+    }
+
+    /// By a rule that is exact for the degree.
+    fn means_over_disk(&self, degree: usize) -> Vec<f64> {
+        let (nx, ny) = self.lines();
+        let (mut lines, mut values) = ([vec![0.0; nx], vec![0.0; ny]], vec![0.0; self.len()]);
+        let (mut means, mut all) = (vec![0.0; self.len()], 0.0);
+        for (place, weight) in disk_rule(degree) {
+            self.evaluate((place.x, place.y), &mut lines, &mut values);
+            means.iter_mut().zip(&values).for_each(|(mean, value)| *mean += weight * value);
+            all += weight;
+        }
+        for mean in &mut means {
+            *mean /= all;
+        }
+        means
     }
 
     /// The coefficient of a term where the field is 1 everywhere.

@@ -1,7 +1,7 @@
 //! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
 
 use super::splines::{Band, bands};
-use crate::FitError;
+use crate::{Chart, FitError};
 
 /// Which functions a field is a sum of: every function of direction times every one of position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,18 @@ pub enum Angular {
         theta_spans: usize,
         /// Equal spans of φ round the horizon; round the cone θ about sin θ times as many.
         phi_spans: usize,
+    },
+    /// Spherical harmonics up to degree l, (l + 1)² of them: directions all round, of the
+    /// perpendicular and the environment chart.
+    Spherical {
+        /// The degree l.
+        degree: usize,
+    },
+    /// Products of Legendre polynomials of the place in the second plane up to the total degree n,
+    /// (n + 1)(n + 2)/2 of them: of the two-plane chart.
+    SecondPlane {
+        /// The total degree n.
+        degree: usize,
     },
 }
 
@@ -102,8 +114,10 @@ impl Angular {
             Self::Zernike { degree, cosine_columns } => {
                 triangular(degree).saturating_add(cosine_columns)
             }
-            Self::Hemispherical { degree } => degree.saturating_add(1).saturating_pow(2),
-            Self::EvenHarmonics { degree } => triangular(degree),
+            Self::Hemispherical { degree } | Self::Spherical { degree } => {
+                degree.saturating_add(1).saturating_pow(2)
+            }
+            Self::EvenHarmonics { degree } | Self::SecondPlane { degree } => triangular(degree),
             // More spans than this have too many functions whatever they are.
             Self::Splines { theta_spans, phi_spans }
                 if theta_spans.max(phi_spans) > COEFFICIENTS_MAX =>
@@ -116,12 +130,23 @@ impl Angular {
         }
     }
 
+    /// Whether they are functions of that chart's rays.
+    pub const fn is_of(&self, chart: &Chart) -> bool {
+        match self {
+            Self::Spherical { .. } => chart.is_whole_sphere(),
+            Self::SecondPlane { .. } => matches!(chart, Chart::TwoPlane { .. }),
+            _ => matches!(chart, Chart::Surface),
+        }
+    }
+
     /// The degree of polynomials; `None` of splines.
     pub fn degree(&self) -> Option<usize> {
         match *self {
             Self::Zernike { degree, .. }
             | Self::Hemispherical { degree }
-            | Self::EvenHarmonics { degree } => Some(degree),
+            | Self::EvenHarmonics { degree }
+            | Self::Spherical { degree }
+            | Self::SecondPlane { degree } => Some(degree),
             Self::Splines { .. } => None,
         }
     }
@@ -133,6 +158,8 @@ impl Angular {
             Self::Hemispherical { .. } => "hemispherical",
             Self::EvenHarmonics { .. } => "even-harmonics",
             Self::Splines { .. } => "splines",
+            Self::Spherical { .. } => "spherical",
+            Self::SecondPlane { .. } => "legendre",
         }
     }
 }

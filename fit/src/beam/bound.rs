@@ -13,8 +13,8 @@
 
 use radiometry::beam::{Beam, Moments};
 
-use crate::Region;
 use crate::basis::Basis;
+use crate::{Chart, Region};
 
 /// A bound for one beam and one basis.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +38,10 @@ impl Bound {
         let widths = [half(x_m), half(y_m)].into_iter().filter(|half| *half > 0.0);
         let narrowest = widths.fold(f64::INFINITY, f64::min);
         let is_even = !narrowest.is_finite();
+        if basis.region().chart != Chart::Surface && !is_even && position_degree > 0 {
+            // Places turn with the direction there.
+            return None;
+        }
         let position = if is_even { 0 } else { i32::try_from(position_degree).unwrap_or(i32::MAX) };
         Some(Self {
             angular: degree as f64,

@@ -58,7 +58,7 @@ impl Cuts {
             None => {}
         }
         // The ray's place on the pupil stands above the plane.
-        if sight.sin > 0.0 {
+        if sight.sin > 0.0 && sight.has_horizon() {
             let height = beam.pupil_z_m() * sight.cos / sight.sin;
             let r = height - beam.separation_m() * node.slope.0;
             within.push(Line { m: (1.0, 0.0), r });
@@ -168,8 +168,14 @@ fn chord(circles: &[Circle; 2], shear: &Shear, cuts: &Cuts, s1: f64) -> Option<(
     }
     if let Some(((x, y), radius)) = cuts.round {
         let at = shear.place((s1, 0.0));
-        let (from, to) = Circle { centre: (x, y), radius }.chord(at.0)?;
-        (low, high) = (low.max(from - at.1), high.min(to - at.1));
+        let (off, step) = ((at.0 - x, at.1 - y), shear.across);
+        // |off + s₂ step| = radius.
+        let square = step.0 * step.0 + step.1 * step.1;
+        let aside = (off.0 * step.1 - off.1 * step.0) / square.sqrt();
+        let root = (radius - aside) * (radius + aside) / square;
+        let half = (root > 0.0).then(|| root.sqrt())?;
+        let middle = -(off.0 * step.0 + off.1 * step.1) / square;
+        (low, high) = (low.max(middle - half), high.min(middle + half));
     }
     (low < high).then_some((low, high))
 }
@@ -204,9 +210,8 @@ fn breaks(circles: &[Circle; 2], shear: &Shear, cuts: &Cuts) -> Vec<f64> {
             }
         }
     }
-    if let Some(((x, _), radius)) = cuts.round {
-        let at = |x: f64| x / shear.alpha + shear.offset.0;
-        breaks.extend([at(x - radius), at(x + radius)]);
+    if let Some((centre, radius)) = cuts.round {
+        breaks.extend(shear.tangents(centre, radius));
     }
     breaks.retain(|s1| *s1 >= low && *s1 <= high);
     breaks.sort_by(f64::total_cmp);

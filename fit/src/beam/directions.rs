@@ -59,10 +59,20 @@ impl Directions {
         Self::of(beam, degree, position_degree, slopes, degrees + 1)
     }
 
-    /// A rule as fine as one of this degree, for what has kinks, so that no degree is exact.
-    pub(crate) fn kinked(beam: &Beam, degree: usize, position_degree: usize) -> Self {
+    /// A rule as fine as one of this degree, for what has kinks, so that no degree is exact. Where it
+    /// is known at which slopes they begin and end, rings lie between these.
+    pub(crate) fn kinked(
+        beam: &Beam,
+        degree: usize,
+        position_degree: usize,
+        breaks: &[f64],
+    ) -> Self {
         let inner = degree.div_ceil(4) + 1;
-        let slopes = slopes(beam, inner, inner + KINKED_MORE);
+        let slopes = if breaks.is_empty() {
+            slopes(beam, inner, inner + KINKED_MORE)
+        } else {
+            slopes_between(beam, breaks, inner + KINKED_MORE)
+        };
         Self::of(beam, degree, position_degree, slopes, degree + 1)
     }
 
@@ -106,12 +116,36 @@ fn slopes(beam: &Beam, inner_count: usize, outer_count: usize) -> Vec<(f64, f64)
             slopes.push((square.sqrt(), weight * inner * inner / 4.0));
         }
     }
-    let (middle, half) = (f64::midpoint(inner, outer), (outer - inner) / 2.0);
-    for (node, weight) in gauss_legendre(outer_count) {
+    between(inner, outer, outer_count, &mut slopes);
+    weighted(beam, slopes)
+}
+
+/// The same with rings between given slopes, rising, as well.
+fn slopes_between(beam: &Beam, breaks: &[f64], count: usize) -> Vec<(f64, f64)> {
+    let (stop, pupil, h) = (beam.stop_radius_m(), beam.pupil_radius_m(), beam.separation_m());
+    let (inner, outer) = ((pupil - stop).abs() / h, (pupil + stop) / h);
+    let mut ends = vec![0.0, inner, outer];
+    ends.extend(breaks.iter().copied().filter(|slope| *slope > 0.0 && *slope < outer));
+    ends.sort_by(f64::total_cmp);
+    let mut slopes = Vec::with_capacity(count * ends.len());
+    for pair in ends.windows(2).filter(|pair| pair[1] > pair[0]) {
+        between(pair[0], pair[1], count, &mut slopes);
+    }
+    weighted(beam, slopes)
+}
+
+/// a da from one slope to another, by a sine.
+fn between(from: f64, to: f64, count: usize, slopes: &mut Vec<(f64, f64)>) {
+    let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
+    for (node, weight) in gauss_legendre(count) {
         let (sin, cos) = libm::sincos(FRAC_PI_2 * node);
         let slope = middle + half * sin;
         slopes.push((slope, weight * half * FRAC_PI_2 * cos * slope));
     }
+}
+
+/// Times what the rays of each slope carry; all sum to one.
+fn weighted(beam: &Beam, mut slopes: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     for (slope, weight) in &mut slopes {
         let ray = 1.0 / (1.0 + *slope * *slope);
         *weight *= lens(beam, *slope).area() * ray * ray;

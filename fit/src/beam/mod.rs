@@ -19,8 +19,8 @@ mod way;
 use glam::DVec3;
 use radiometry::beam::{Beam, footprint};
 
-use crate::basis::{Basis, Scratch};
-use crate::{FitError, Ray};
+use crate::basis::{Basis, Scratch, SecondPlane};
+use crate::{Chart, FitError, Ray};
 use bound::Bound;
 use cut::{Cuts, Cutter};
 use directions::{Directions, Node};
@@ -53,7 +53,7 @@ impl Optics {
 fn corners(beam: &Beam, ray: &Ray) -> Option<[(f64, f64); 4]> {
     let theta = ray.theta_rad.clamp(0.0, core::f64::consts::FRAC_PI_2);
     let reach = footprint(beam, theta).ok().flatten()?;
-    let (sight, y) = (Sight::new(ray), reach.across_m);
+    let (sight, y) = (Sight::new(ray, Chart::Surface), reach.across_m);
     let corners = [(-reach.far_m, -y), (-reach.far_m, y), (reach.near_m, -y), (reach.near_m, y)];
     Some(corners.map(|corner| sight.place(corner)))
 }
@@ -73,6 +73,7 @@ enum Cover {
 #[derive(Debug, Clone)]
 pub(crate) struct Averager {
     optics: Optics,
+    chart: Chart,
     /// `None` of a basis for which rules are compared instead.
     bound: Option<Bound>,
     /// By rising degree.
@@ -93,14 +94,18 @@ impl Averager {
         let is_wide = |(from, to): (f64, f64)| to > from;
         let is_even = !is_wide(region.x_m) && !is_wide(region.y_m);
         let degree = if is_even { 0 } else { basis.places().rule_degree() };
+        // Of functions of the second plane as well.
+        let degree = degree + basis.directions().second_plane().map_or(0, SecondPlane::degree);
         let beam = &optics.beam;
         let smooth = SMOOTH_DEGREES.iter().map(|d| Directions::smooth(beam, *d, degree));
-        let across = ACROSS_DEGREES.iter().map(|d| Directions::kinked(beam, *d, degree));
+        let breaks = breaks_of_object(optics, region.chart);
+        let across = ACROSS_DEGREES.iter().map(|d| Directions::kinked(beam, *d, degree, &breaks));
         let axes = [(true, region.x_m), (false, region.y_m)];
         let limit = basis.places().continued();
         let ends = axes.into_iter().filter(|(_, axis)| degree > 0 && is_wide(*axis));
         Ok(Self {
             optics: *optics,
+            chart: region.chart,
             bound: Bound::new(&optics.beam, basis),
             smooth: smooth.collect(),
             across: across.collect(),
@@ -111,7 +116,38 @@ impl Averager {
 
     /// Where the footprint of a beam along this ray lies.
     fn cover(&self, ray: &Ray) -> Cover {
-        corners(&self.optics.beam, ray).map_or(Cover::Across, |corners| self.cover_of(&corners))
+        match self.chart {
+            Chart::Surface | Chart::TwoPlane { .. } => corners(&self.optics.beam, ray)
+                .map_or(Cover::Across, |corners| self.cover_of(&corners)),
+            Chart::Environment => Cover::Within,
+            Chart::Perpendicular { .. } => self.cover_across(ray),
+        }
+    }
+
+    /// The same where each direction has a plane of its own. All rays come as near to the axis's
+    /// place as the beam reaches, and lean no more than its slope; planes turn, distances from the
+    /// origin don't.
+    fn cover_across(&self, ray: &Ray) -> Cover {
+        let beam = &self.optics.beam;
+        let reach_m = beam.reach_m(0.0);
+        let slope = (beam.stop_radius_m() + beam.pupil_radius_m()) / beam.separation_m();
+        let place_m = libm::hypot(ray.x_m, ray.y_m);
+        let nearest_m = (place_m - reach_m).max(0.0) / libm::hypot(1.0, slope);
+        let farthest_m = place_m + reach_m;
+        let ends = self.ends.iter().map(|(_, (low, high))| low.abs().min(high.abs()));
+        let is_beyond_ends = farthest_m > ends.fold(f64::INFINITY, f64::min);
+        match self.optics.outline {
+            Some(Outline::Disk { centre_m: (0.0, 0.0), radius_m }) if nearest_m > radius_m => {
+                Cover::Off
+            }
+            Some(Outline::Disk { centre_m: (0.0, 0.0), radius_m })
+                if farthest_m <= radius_m && !is_beyond_ends =>
+            {
+                Cover::Within
+            }
+            None if !is_beyond_ends => Cover::Within,
+            _ => Cover::Across,
+        }
     }
 
     /// Where the convex hull of places lies.
@@ -152,11 +188,11 @@ impl Averager {
         out: &mut [f64],
     ) {
         out.fill(0.0);
-        let sight = Sight::new(ray);
+        let sight = Sight::new(ray, self.chart);
         for node in &rule.nodes {
             let Some(direction) = sight.direction(node.slope) else { continue };
             let shear = sight.shear(&self.optics.beam, node);
-            scratch.clear();
+            scratch.aim(direction);
             self.whole(rule, node, (&sight, &shear), basis, scratch);
             scratch.direction_along(direction, basis);
             scratch.add(node.weight, out);
@@ -172,7 +208,7 @@ impl Averager {
         basis: &Basis,
         scratch: &mut Means,
     ) {
-        if self.ends.is_empty() {
+        if self.ends.is_empty() && !basis.is_joint() {
             scratch.add_place(1.0, basis, (0.0, 0.0));
             return;
         }
@@ -193,17 +229,18 @@ impl Averager {
         out: &mut [f64],
     ) {
         out.fill(0.0);
-        let (sight, beam) = (Sight::new(ray), &self.optics.beam);
+        let (sight, beam) = (Sight::new(ray, self.chart), &self.optics.beam);
         for node in &rule.nodes {
             let Some(direction) = sight.direction(node.slope) else { continue };
             let shear = sight.shear(beam, node);
-            scratch.clear();
+            scratch.aim(direction);
             let ring = &rule.rings[node.ring];
             let (low, high) = ring.lens.box_of(node.cos, node.sin);
             let corners = [(low.0, low.1), (low.0, high.1), (high.0, low.1), (high.0, high.1)];
             let corners = corners.map(|corner| sight.place(shear.place(corner)));
-            let is_above = beam.pupil_z_m() * sight.cos
-                > (high.0 + beam.separation_m() * node.slope.0) * sight.sin;
+            let is_above = !sight.has_horizon()
+                || beam.pupil_z_m() * sight.cos
+                    > (high.0 + beam.separation_m() * node.slope.0) * sight.sin;
             match self.cover_of(&corners) {
                 Cover::Off => continue,
                 Cover::Within if is_above => {
@@ -230,6 +267,9 @@ pub(crate) struct Means {
     place: Scratch,
     position: Vec<f64>,
     direction: Vec<f64>,
+    /// Of functions that are no product: the row's mean over the places of one direction, and room.
+    joint: Option<(Vec<f64>, Vec<f64>)>,
+    towards: DVec3,
     moments: Moments,
 }
 
@@ -239,19 +279,38 @@ impl Means {
             place: basis.scratch(),
             position: vec![0.0; basis.position_len()],
             direction: vec![0.0; basis.angular_len()],
+            joint: basis.is_joint().then(|| (vec![0.0; basis.len()], vec![0.0; basis.len()])),
+            towards: DVec3::Z,
             moments: Moments::default(),
         }
     }
 
+    /// Begins with another direction.
+    fn aim(&mut self, towards: DVec3) {
+        self.towards = towards;
+        self.clear();
+    }
+
     fn direction_along(&mut self, direction: DVec3, basis: &Basis) {
+        if self.joint.is_some() {
+            return;
+        }
         basis.direction_along(direction, &mut self.place, &mut self.direction);
     }
 
     fn clear(&mut self) {
         self.position.fill(0.0);
+        if let Some((mean, _)) = &mut self.joint {
+            mean.fill(0.0);
+        }
     }
 
     fn add_place(&mut self, weight: f64, basis: &Basis, (x_m, y_m): (f64, f64)) {
+        if let Some((mean, row)) = &mut self.joint {
+            basis.row_from((x_m, y_m), self.towards, &mut self.place, row);
+            mean.iter_mut().zip(row).for_each(|(mean, value)| *mean += weight * *value);
+            return;
+        }
         basis.position_continued(x_m, y_m, &mut self.place);
         for (mean, term) in self.position.iter_mut().zip(self.place.position()) {
             *mean += weight * term;
@@ -259,11 +318,36 @@ impl Means {
     }
 
     fn add(&self, weight: f64, out: &mut [f64]) {
+        if let Some((mean, _)) = &self.joint {
+            out.iter_mut().zip(mean).for_each(|(out, mean)| *out += weight * mean);
+            return;
+        }
         for (mean, block) in self.position.iter().zip(out.chunks_exact_mut(self.direction.len())) {
             let factor = weight * mean;
             block.iter_mut().zip(&self.direction).for_each(|(out, z)| *out += factor * z);
         }
     }
+}
+
+/// The slopes at which the rays of a beam that looks at a round object's middle begin to miss it, and
+/// end: where the place and the pupil's shadow meet its edge. Nothing of other outlines.
+fn breaks_of_object(optics: &Optics, chart: Chart) -> Vec<f64> {
+    let (Chart::Perpendicular { .. }, Some(Outline::Disk { radius_m, .. })) =
+        (chart, optics.outline)
+    else {
+        return Vec::new();
+    };
+    let (beam, h) = (&optics.beam, optics.beam.pupil_z_m());
+    let pupil = beam.pupil_radius_m();
+    if pupil >= beam.stop_radius_m() || h <= radius_m + pupil {
+        return Vec::new();
+    }
+    // (h a ± r)/√(1 + a²) = R, by iteration: each step takes R a/h of the error away.
+    let slope = |side: f64| {
+        let step = |a: f64| (radius_m * libm::hypot(1.0, a) - side * pupil) / h;
+        (0..ITERATIONS).fold(0.0, |a, _| step(a))
+    };
+    vec![slope(1.0), slope(-1.0)]
 }
 
 /// An interval stretched about its middle.
@@ -274,5 +358,7 @@ fn continued((from, to): (f64, f64), limit: f64) -> (f64, f64) {
 
 /// Degrees in the slopes of rules for beams that nothing cuts.
 const SMOOTH_DEGREES: [usize; 6] = [3, 5, 7, 9, 13, 21];
+/// Of a slope: R/h is below one half or so.
+const ITERATIONS: usize = 60;
 /// Degrees of rules for beams that something cuts: what is averaged has kinks.
 const ACROSS_DEGREES: [usize; 3] = [7, 13, 25];

@@ -14,8 +14,8 @@ use std::collections::HashMap;
 use super::directions::Directions;
 use super::sight::Sight;
 use super::{Averager, Means};
-use crate::Ray;
 use crate::basis::Basis;
+use crate::{Chart, Ray};
 
 /// Moments found so far, of beams of a rule and a direction.
 #[derive(Debug, Default)]
@@ -44,7 +44,8 @@ impl Averager {
         scratch: &mut Means,
         out: &mut [f64],
     ) -> bool {
-        if self.ends.is_empty() || !basis.places().is_polynomial() {
+        let is_on_plane = matches!(basis.region().chart, Chart::Surface);
+        if self.ends.is_empty() || !basis.places().is_polynomial() || !is_on_plane {
             return false;
         }
         let key = (rule.degree, ray.theta_rad.to_bits(), ray.phi_rad.to_bits());
@@ -72,7 +73,7 @@ impl Averager {
         let (degree, region) = (basis.places().rule_degree(), basis.region());
         let scale = |(from, to): (f64, f64)| if to > from { 2.0 / (to - from) } else { 0.0 };
         let scale = (scale(region.x_m), scale(region.y_m));
-        let sight = Sight::new(&Ray { x_m: 0.0, y_m: 0.0, ..*ray });
+        let sight = Sight::new(&Ray { x_m: 0.0, y_m: 0.0, ..*ray }, Chart::Surface);
         let mut means = vec![0.0; basis.len()];
         let mut powers = (vec![1.0; degree + 1], vec![1.0; degree + 1]);
         let mut reach = (0.0_f64, 0.0_f64);

@@ -14,7 +14,7 @@ use crate::beam::Optics;
 use crate::check::check;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
-use crate::{Angular, BasisSpec, FitError, Penalised, Penalty, Position, Region, Sample};
+use crate::{Angular, BasisSpec, Chart, FitError, Penalised, Penalty, Position, Region, Sample};
 use family::{Family, Strengths, Trial};
 
 pub use sweeps::SweepKind;
@@ -31,12 +31,46 @@ pub enum AngularKind {
     EvenHarmonics,
     /// [`Angular::Splines`].
     Splines,
+    /// [`Angular::Spherical`].
+    Spherical,
+    /// [`Angular::SecondPlane`].
+    SecondPlane,
 }
 
 impl AngularKind {
     /// All of them.
-    pub const ALL: [Self; 4] =
+    pub const ALL: [Self; 6] = [
+        Self::Zernike,
+        Self::Hemispherical,
+        Self::EvenHarmonics,
+        Self::Splines,
+        Self::Spherical,
+        Self::SecondPlane,
+    ];
+    /// Those of the surface chart.
+    pub const OF_SURFACE: [Self; 4] =
         [Self::Zernike, Self::Hemispherical, Self::EvenHarmonics, Self::Splines];
+
+    /// The one that has degrees, and is taken where a degree is named and no kind.
+    pub const fn of_chart(chart: &Chart) -> Self {
+        match chart {
+            Chart::Surface => Self::Zernike,
+            Chart::Perpendicular { .. } | Chart::Environment => Self::Spherical,
+            Chart::TwoPlane { .. } => Self::SecondPlane,
+        }
+    }
+
+    /// The functions of a degree; splines have none.
+    pub const fn of_degree(self, degree: usize) -> Option<Angular> {
+        match self {
+            Self::Zernike => Some(Angular::Zernike { degree, cosine_columns: 0 }),
+            Self::Hemispherical => Some(Angular::Hemispherical { degree }),
+            Self::EvenHarmonics => Some(Angular::EvenHarmonics { degree }),
+            Self::Spherical => Some(Angular::Spherical { degree }),
+            Self::SecondPlane => Some(Angular::SecondPlane { degree }),
+            Self::Splines => None,
+        }
+    }
 
     /// As plans write it.
     pub fn name(self) -> &'static str {
@@ -45,6 +79,8 @@ impl AngularKind {
             Self::Hemispherical => "hemispherical",
             Self::EvenHarmonics => "even-harmonics",
             Self::Splines => "splines",
+            Self::Spherical => "spherical",
+            Self::SecondPlane => "legendre",
         }
     }
 }
@@ -65,18 +101,20 @@ pub struct Wish {
 }
 
 impl Wish {
+    /// The same for a chart: of those other than the surface one there is one kind alone.
+    #[must_use]
+    pub fn in_chart(self, chart: &Chart) -> Self {
+        let only = (*chart != Chart::Surface).then(|| AngularKind::of_chart(chart));
+        Self { kind: self.kind.or(only), ..self }
+    }
+
     /// The one model that is left; `None` if there is something to choose. Who names the degree
     /// in direction gets plain least squares unless a penalty is named too.
     pub fn decided(&self) -> Option<Penalised> {
         let penalty = self.penalty()?;
         let position = Position::Legendre { degree: self.position_degree? };
         let degree = self.angular_degree?;
-        let angular = match self.kind.unwrap_or(AngularKind::Zernike) {
-            AngularKind::Zernike => Angular::Zernike { degree, cosine_columns: 0 },
-            AngularKind::Hemispherical => Angular::Hemispherical { degree },
-            AngularKind::EvenHarmonics => Angular::EvenHarmonics { degree },
-            AngularKind::Splines => return None,
-        };
+        let angular = self.kind.unwrap_or(AngularKind::Zernike).of_degree(degree)?;
         Some(Penalised::new(BasisSpec { angular, position }, penalty))
     }
 
@@ -138,10 +176,11 @@ pub fn choose(
     wish: &Wish,
     optics: Option<&Optics>,
 ) -> Result<(Penalised, Option<Choice>), FitError> {
+    let wish = &wish.in_chart(&region.chart);
     if let Some(model) = wish.decided() {
         return Ok((model, None));
     }
-    check(samples, region, BasisSpec::zernike(0, 0).into(), &[])?;
+    check(samples, region, smallest(region, 0, 0).into(), &[])?;
     let sweeps = Sweeps::of(samples, region).thinned(READINGS_MAX);
     let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
     let mut search = Search::new(&chosen, region, wish, optics, &sweeps);
@@ -152,7 +191,7 @@ pub fn choose(
     let Some(&(_, best)) = tried.first() else {
         // Nothing can be left out: the mean is all there is.
         let degree = wish.angular_degree.unwrap_or(0);
-        let model = BasisSpec::zernike(degree, wish.position_degree.unwrap_or(0)).into();
+        let model = smallest(region, degree, wish.position_degree.unwrap_or(0)).into();
         return Ok((model, None));
     };
     let truncation = truncation(&tried);
@@ -171,6 +210,15 @@ pub fn choose(
     };
     let model = Penalised { truncation, ..choice.candidates[0].model };
     Ok((model, Some(choice)))
+}
+
+/// A basis of a region's chart that is taken where nothing can be chosen.
+fn smallest(region: &Region, degree: usize, position_degree: usize) -> BasisSpec {
+    let angular = AngularKind::of_chart(&region.chart).of_degree(degree);
+    BasisSpec {
+        angular: angular.unwrap_or(Angular::Zernike { degree, cosine_columns: 0 }),
+        position: Position::Legendre { degree: position_degree },
+    }
 }
 
 /// Brings the finest basis of the best one's kind to the front that does about as well: what a basis
@@ -259,6 +307,8 @@ impl<'s> Search<'s> {
             Some(AngularKind::Hemispherical) => &[AngularKind::Hemispherical],
             Some(AngularKind::EvenHarmonics) => &[AngularKind::EvenHarmonics],
             Some(AngularKind::Splines) => &[AngularKind::Splines],
+            Some(AngularKind::Spherical) => &[AngularKind::Spherical],
+            Some(AngularKind::SecondPlane) => &[AngularKind::SecondPlane],
             None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
             None => &[AngularKind::Zernike, AngularKind::Hemispherical, AngularKind::Splines],
         };
@@ -283,7 +333,10 @@ impl<'s> Search<'s> {
         }
         let degree = self.wish.angular_degree.unwrap_or(MIDDLING).min(MIDDLING);
         let columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
-        let angular = Angular::Zernike { degree, cosine_columns: columns };
+        let angular = match self.region.chart {
+            Chart::Surface => Angular::Zernike { degree, cosine_columns: columns },
+            _ => smallest(self.region, degree, 0).angular,
+        };
         let mut most = self.position_most;
         let spec = |degree| BasisSpec { angular, position: Position::Legendre { degree } };
         while most > 0 && spec(most).len() > self.coefficients_max {
@@ -325,6 +378,14 @@ impl<'s> Search<'s> {
             AngularKind::EvenHarmonics => degrees(&ZERNIKE)
                 .into_iter()
                 .map(|degree| Angular::EvenHarmonics { degree })
+                .collect(),
+            AngularKind::Spherical => degrees(&SPHERICAL)
+                .into_iter()
+                .map(|degree| Angular::Spherical { degree })
+                .collect(),
+            AngularKind::SecondPlane => degrees(&SECOND_PLANE)
+                .into_iter()
+                .map(|degree| Angular::SecondPlane { degree })
                 .collect(),
             AngularKind::Splines => SPLINES
                 .into_iter()
@@ -393,6 +454,8 @@ const WORSE_MAX: usize = 3;
 const SHARING: usize = 5;
 const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
 const HEMISPHERICAL: [usize; 8] = [2, 4, 6, 8, 10, 12, 15, 18];
+const SPHERICAL: [usize; 10] = [0, 1, 2, 4, 6, 8, 10, 12, 15, 18];
+const SECOND_PLANE: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 10, 12];
 /// Spans of θ, and of φ round the horizon.
 const SPLINES: [(usize, usize); 8] =
     [(4, 8), (7, 12), (12, 8), (10, 16), (20, 10), (14, 20), (20, 16), (20, 26)];

@@ -122,12 +122,14 @@ fn by_key(rays: &[Ray], key: Keys<'_>) -> Vec<Vec<usize>> {
 
 /// Halves the readings across the coordinate that varies most, again and again.
 fn blocks(samples: &[Sample], region: &Region) -> Vec<Vec<usize>> {
-    let places: Vec<[f64; 4]> = samples
+    let is_whole = region.chart.is_whole_sphere();
+    let places: Vec<[f64; 5]> = samples
         .iter()
         .map(|sample| {
             let (sin, (s, c)) = (libm::sin(sample.ray.theta_rad), libm::sincos(sample.ray.phi_rad));
             let (x, y) = region.scaled(&sample.ray);
-            [sin * c, sin * s, x, y]
+            let z = if is_whole { libm::cos(sample.ray.theta_rad) } else { 0.0 };
+            [sin * c, sin * s, x, y, z]
         })
         .collect();
     let mut blocks = vec![(0..samples.len()).collect::<Vec<usize>>()];
@@ -137,14 +139,14 @@ fn blocks(samples: &[Sample], region: &Region) -> Vec<Vec<usize>> {
     blocks
 }
 
-fn halves(mut block: Vec<usize>, places: &[[f64; 4]]) -> [Vec<usize>; 2] {
+fn halves(mut block: Vec<usize>, places: &[[f64; 5]]) -> [Vec<usize>; 2] {
     let spread = |axis: usize| {
         let values = block.iter().map(|i| places[*i][axis]);
         let (low, high) = values
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         high - low
     };
-    let axis = (0..4).fold(0, |best, axis| if spread(axis) > spread(best) { axis } else { best });
+    let axis = (0..5).fold(0, |best, axis| if spread(axis) > spread(best) { axis } else { best });
     let by_place = |a: &usize, b: &usize| {
         let order = places[*a][axis].total_cmp(&places[*b][axis]);
         order.then_with(|| {

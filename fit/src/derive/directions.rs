@@ -36,13 +36,18 @@ pub(super) struct Direction {
 }
 
 impl Zone {
-    pub(super) fn check(&self) -> Result<(), DeriveError> {
+    pub(super) fn check(&self, end_rad: f64) -> Result<(), DeriveError> {
         let refuse = |what, value, expected| Err(DeriveError::Domain { what, value, expected });
-        if !(self.from_rad >= 0.0 && self.from_rad < FRAC_PI_2) {
-            return refuse("from_rad", self.from_rad, "an angle from 0 to below π/2");
+        let [from, to] = if end_rad > FRAC_PI_2 {
+            ["an angle from 0 to below π", "an angle above from_rad, up to π"]
+        } else {
+            ["an angle from 0 to below π/2", "an angle above from_rad, up to π/2"]
+        };
+        if !(self.from_rad >= 0.0 && self.from_rad < end_rad) {
+            return refuse("from_rad", self.from_rad, from);
         }
-        if !(self.to_rad > self.from_rad && self.to_rad <= FRAC_PI_2 + 1e-9) {
-            return refuse("to_rad", self.to_rad, "an angle above from_rad, up to π/2");
+        if !(self.to_rad > self.from_rad && self.to_rad <= end_rad + 1e-9) {
+            return refuse("to_rad", self.to_rad, to);
         }
         Ok(())
     }
@@ -71,13 +76,31 @@ impl Zone {
         }
         directions
     }
+
+    /// The same by solid angle: Gauss-Legendre in cos θ times equidistant azimuths.
+    pub(super) fn all_directions(self, rings: usize, spokes: usize) -> Vec<Direction> {
+        let (low, high) = (libm::cos(self.to_rad), libm::cos(self.from_rad));
+        let mut directions = Vec::with_capacity(rings * spokes);
+        for (node, weight) in gauss_legendre(rings) {
+            let theta_rad = libm::acos(0.5 * ((1.0 - node) * low + (1.0 + node) * high));
+            let weight_sr = 0.5 * weight * (high - low) * TAU / spokes as f64;
+            directions.extend((0..spokes).map(|k| {
+                let phi_rad = TAU * k as f64 / spokes as f64;
+                Direction { theta_rad, phi_rad, weight_sr }
+            }));
+        }
+        directions
+    }
 }
 
 impl Cone {
-    pub(super) fn check(&self) -> Result<(), DeriveError> {
+    pub(super) fn check(&self, end_rad: f64) -> Result<(), DeriveError> {
         let refuse = |what, value, expected| Err(DeriveError::Domain { what, value, expected });
-        if !(self.axis_theta_rad >= 0.0 && self.axis_theta_rad <= FRAC_PI_2 + 1e-9) {
-            return refuse("axis_theta_rad", self.axis_theta_rad, "an angle from 0 to π/2");
+        if !(self.axis_theta_rad >= 0.0 && self.axis_theta_rad <= end_rad + 1e-9) {
+            let is_whole = end_rad > FRAC_PI_2;
+            let expected =
+                if is_whole { "an angle from 0 to π" } else { "an angle from 0 to π/2" };
+            return refuse("axis_theta_rad", self.axis_theta_rad, expected);
         }
         if !self.axis_phi_rad.is_finite() {
             return refuse("axis_phi_rad", self.axis_phi_rad, "a finite angle");
@@ -86,6 +109,20 @@ impl Cone {
             return refuse("half_angle_rad", self.half_angle_rad, "an angle above 0, up to π/2");
         }
         Ok(())
+    }
+
+    /// By solid angle, whatever lies below: Gauss-Legendre in the cosine about the axis.
+    pub(super) fn all_directions(self, rings: usize, spokes: usize) -> Vec<Direction> {
+        let about = Zone { from_rad: 0.0, to_rad: self.half_angle_rad };
+        let axis = unit(self.axis_theta_rad, self.axis_phi_rad);
+        let (across, beside) = tilt_frame(axis, self.axis_phi_rad);
+        let mut directions = about.all_directions(rings, spokes);
+        for direction in &mut directions {
+            let local = unit(direction.theta_rad, direction.phi_rad);
+            let towards = local.z * axis + local.x * across + local.y * beside;
+            (direction.theta_rad, direction.phi_rad) = angles(towards);
+        }
+        directions
     }
 
     /// Circles about the axis, each as far as it is above the horizon. Where the horizon begins to

@@ -5,6 +5,15 @@ use std::fmt;
 /// Why there is no such quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeriveError {
+    /// Another chart's quantity.
+    OfChart {
+        /// The quantity.
+        what: &'static str,
+        /// The fit's chart.
+        chart: &'static str,
+        /// What the chart has.
+        instead: &'static str,
+    },
     /// The region is a single place or a line: nothing can be integrated over it.
     NoArea,
     /// A receiver lies below the sample's plane, or touches it.
@@ -73,6 +82,9 @@ pub enum DeriveError {
 impl fmt::Display for DeriveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::OfChart { what, chart, instead } => {
+                write!(f, "a fit in the {chart} chart has no {what}; it has {instead}")
+            }
             Self::NoArea => f.write_str(
                 "the fit's region has no area: it has radiance and exitance, but no intensity, flux \
                  or irradiance",

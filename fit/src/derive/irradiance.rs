@@ -30,6 +30,7 @@ impl Field<'_> {
         if self.medium.is_immersion() {
             return Err(DeriveError::InAir { what: "the receiver" });
         }
+        self.demand_surface("irradiance at a receiver elsewhere")?;
         self.area_m2()?;
         let region = *self.fit.region();
         let lit = seen_part(&region, receiver);

@@ -3,11 +3,11 @@
 
 use super::sum::{Node, is_measured};
 use super::{DeriveError, Field};
-use crate::{Estimate, Ray, Region};
+use crate::{Chart, Estimate, Ray, Region};
 use glam::DVec3;
 use radiometry::chart::{Surface, TwoPlane};
 use radiometry::direction::{angle_between, angles, frame, normalised, unit};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// How the hemisphere before a point is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,11 +90,17 @@ impl Field<'_> {
         if self.medium.is_immersion() {
             return Err(DeriveError::InAir { what: "the point" });
         }
+        if !matches!(self.fit.region().chart, Chart::Environment) {
+            self.demand_surface("environment map")?;
+        }
         let no_direction = || DeriveError::Receiver {
             what: "its normal has no direction; expected three finite numbers, not all 0"
                 .to_owned(),
         };
         let normal = normalised(map.normal).ok_or_else(no_direction)?;
+        if let Chart::Environment = self.fit.region().chart {
+            return self.resampled(map, normal);
+        }
         if !map.place_m.is_finite() || map.place_m.z <= 0.0 {
             return Err(DeriveError::BelowPlane { height_m: map.place_m.z });
         }
@@ -104,6 +110,48 @@ impl Field<'_> {
         let cells = (0..map.rows * map.columns)
             .map(|k| self.cell(map, &sight, normal, (k / map.columns, k % map.columns)));
         Ok(cells.collect())
+    }
+
+    /// The map of an environment that was measured itself: all round, the map's rows going from its
+    /// normal to the opposite. The middle of a cell stands for it.
+    fn resampled(
+        &self,
+        map: &EnvironmentMap,
+        normal: DVec3,
+    ) -> Result<Vec<EnvironmentCell>, DeriveError> {
+        check_count("cells", map.rows.saturating_mul(map.columns))?;
+        let (t, b) = frame(normal);
+        let step_rad = TAU / map.columns as f64;
+        let cell = |k: usize| {
+            let (row, column) = (k / map.columns, k % map.columns);
+            let share = |i: usize| i as f64 / map.rows as f64;
+            let (upper, lower, middle_rad) = match map.cells {
+                Cells::LatLong => (
+                    libm::cos(PI * share(row)),
+                    libm::cos(PI * share(row + 1)),
+                    PI * (row as f64 + 0.5) / map.rows as f64,
+                ),
+                Cells::EqualArea => {
+                    let cos = |i: usize| 1.0 - 2.0 * share(i);
+                    (cos(row), cos(row + 1), libm::acos(f64::midpoint(cos(row), cos(row + 1))))
+                }
+            };
+            let phi_rad = step_rad * (column as f64 + 0.5);
+            let local = unit(middle_rad, phi_rad);
+            let towards = local.x * t + local.y * b + local.z * normal;
+            let (theta, phi) = angles(towards);
+            let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad: theta, phi_rad: phi };
+            EnvironmentCell {
+                theta_rad: middle_rad,
+                phi_rad,
+                towards,
+                solid_angle_sr: (upper - lower) * step_rad,
+                covered: 1.0,
+                measured: f64::from(u8::from(is_measured(self.fit, &ray))),
+                radiance: self.fit.radiance(&ray),
+            }
+        };
+        Ok((0..map.rows * map.columns).map(cell).collect())
     }
 
     fn cell(
@@ -167,6 +215,9 @@ impl Field<'_> {
     /// The radiance along the rays of a grid between two planes: t fastest, then s, v and u.
     pub fn two_plane(&self, grid: &TwoPlaneGrid) -> Result<Vec<TwoPlaneRay>, DeriveError> {
         let TwoPlaneGrid { distance_m, u, v, s, t } = *grid;
+        if !matches!(self.fit.region().chart, Chart::TwoPlane { .. }) {
+            self.demand_surface("two-plane table")?;
+        }
         if !(distance_m > 0.0 && distance_m.is_finite()) {
             let expected = "more than 0";
             return Err(DeriveError::Domain { what: "distance_m", value: distance_m, expected });

@@ -35,9 +35,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::{Contribution, Estimate, Fit};
-use std::f64::consts::FRAC_PI_2;
+use crate::{Chart, Contribution, Estimate, Fit};
+use std::f64::consts::{FRAC_PI_2, PI};
 
+pub use arriving::PointReceiver;
 pub use directions::{Cone, Zone};
 pub use error::{DeriveError, Remark};
 pub use irradiance::Received;
@@ -47,6 +48,7 @@ pub use peak_intensity::PeakIntensity;
 pub use receiver::Receiver;
 pub use width::Reference;
 
+mod arriving;
 mod directions;
 mod error;
 mod exitance;
@@ -61,6 +63,9 @@ mod width;
 
 /// All directions above the sample's plane.
 pub const HEMISPHERE: Zone = Zone { from_rad: 0.0, to_rad: FRAC_PI_2 };
+
+/// All directions of the chart, whatever they are.
+pub const ALL_DIRECTIONS: Zone = Zone { from_rad: 0.0, to_rad: PI };
 
 /// A fitted field as it leaves the sample, what stood in front of it removed.
 #[derive(Debug, Clone, Copy)]
@@ -95,6 +100,9 @@ impl<'f> Field<'f> {
     /// The field below the layer that stood between it and the air, the layer removed.
     pub fn without(fit: &'f Fit, medium: Medium) -> Result<Self, DeriveError> {
         medium.check()?;
+        if medium != Medium::Air && fit.region().chart.is_whole_sphere() {
+            return Err(of_chart("window or medium to remove", &fit.region().chart));
+        }
         Ok(Self { fit, medium })
     }
 
@@ -106,6 +114,37 @@ impl<'f> Field<'f> {
     /// What is removed.
     pub fn medium(&self) -> &Medium {
         &self.medium
+    }
+
+    /// Refuses what only light from a flat sample has.
+    fn demand_surface(&self, what: &'static str) -> Result<(), DeriveError> {
+        let chart = &self.fit.region().chart;
+        if matches!(chart, Chart::Surface) { Ok(()) } else { Err(of_chart(what, chart)) }
+    }
+
+    /// Refuses what only light has that leaves something in directions of its own.
+    fn demand_leaving(&self, what: &'static str) -> Result<(), DeriveError> {
+        let chart = &self.fit.region().chart;
+        match chart {
+            Chart::Surface | Chart::Perpendicular { .. } => Ok(()),
+            Chart::Environment | Chart::TwoPlane { .. } => Err(of_chart(what, chart)),
+        }
+    }
+
+    fn demand_environment(&self, what: &'static str) -> Result<(), DeriveError> {
+        let chart = &self.fit.region().chart;
+        if matches!(chart, Chart::Environment) { Ok(()) } else { Err(of_chart(what, chart)) }
+    }
+
+    /// By what a part of the plane counts in a direction: dA cos θ on a sample, and all of it
+    /// across the direction.
+    fn projection(&self, theta_rad: f64) -> f64 {
+        if self.fit.region().chart.is_whole_sphere() { 1.0 } else { libm::cos(theta_rad) }
+    }
+
+    /// The largest θ of the chart.
+    fn theta_end_rad(&self) -> f64 {
+        if self.fit.region().chart.is_whole_sphere() { PI } else { FRAC_PI_2 }
     }
 
     /// The region's area, m²; a region without one has radiance and exitance alone.
@@ -129,4 +168,16 @@ impl Derived {
         self.quadrature_bound *= factor;
         self
     }
+}
+
+fn of_chart(what: &'static str, chart: &Chart) -> DeriveError {
+    let instead = match chart {
+        Chart::Surface => "radiance, exitance, intensity, flux, irradiance at a receiver",
+        Chart::Perpendicular { .. } => "radiance, intensity and flux",
+        Chart::Environment => "radiance, an environment map and the irradiance at its point",
+        Chart::TwoPlane { .. } => {
+            "radiance, the flux through both rectangles and a resampled table"
+        }
+    };
+    DeriveError::OfChart { what, chart: chart.name(), instead }
 }

@@ -7,7 +7,7 @@ use super::{DeriveError, Derived, Field, Remark};
 use crate::{Estimate, Functional};
 use glam::DVec3;
 use radiometry::direction::{angles, unit};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The largest intensity within the cone that was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +29,7 @@ pub struct PeakIntensity {
 impl Field<'_> {
     /// The largest intensity within the cone that was measured.
     pub fn peak_intensity(&self) -> Result<PeakIntensity, DeriveError> {
+        self.demand_leaving("peak intensity")?;
         let area_m2 = self.area_m2()?;
         let end_rad = self.cone_end_rad();
         let lobes = self.lobes(end_rad)?;
@@ -50,7 +51,7 @@ impl Field<'_> {
                 intensity.remarks.push(Remark::Tie);
             }
         }
-        let is_at_rim = theta_rad > end_rad - 2.0 * STENCIL_RAD;
+        let is_at_rim = end_rad < PI && theta_rad > end_rad - 2.0 * STENCIL_RAD;
         if is_at_rim {
             intensity.remarks.push(Remark::AtRim);
         }
@@ -60,14 +61,16 @@ impl Field<'_> {
     }
 
     fn cone_end_rad(&self) -> f64 {
-        self.medium.inner_theta_rad(self.fit.region().theta_max_rad.min(FRAC_PI_2))
+        self.medium.inner_theta_rad(self.fit.region().theta_max_rad.min(self.theta_end_rad()))
     }
 
     /// The intensity over the area as a functional.
     fn over_area(&self, towards: DVec3) -> Result<Functional, DeriveError> {
         let (theta_rad, phi_rad) = angles(towards);
-        let node = Node::Towards { theta_rad: theta_rad.min(FRAC_PI_2), phi_rad };
-        Ok(self.functional(node)?.times(towards.z.max(0.0)))
+        let node = Node::Towards { theta_rad: theta_rad.min(self.theta_end_rad()), phi_rad };
+        let is_whole = self.fit.region().chart.is_whole_sphere();
+        let projection = if is_whole { 1.0 } else { towards.z.max(0.0) };
+        Ok(self.functional(node)?.times(projection))
     }
 
     /// The tops of lobes with their heights, the highest first: from the best points of a grid.

@@ -209,7 +209,7 @@ impl Derived {
 
 /// Whether something was measured about the ray: within the region's rectangle and its cone.
 pub(super) fn is_measured(fit: &Fit, ray: &Ray) -> bool {
-    fit.region().holds(ray) && ray.theta_rad <= fit.region().theta_max_rad + ROUNDING_RAD
+    fit.region().covers(ray)
 }
 
 /// Places over the region with their shares, by Gauss-Legendre; one along a side without length.

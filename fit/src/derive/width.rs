@@ -9,7 +9,7 @@
 use super::sum::Node;
 use super::{DeriveError, Derived, Field, Remark};
 use crate::{Estimate, Functional};
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 /// What the share is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +50,7 @@ impl Field<'_> {
         level: f64,
         reference: Reference,
     ) -> Result<Derived, DeriveError> {
+        self.demand_leaving("beam angle")?;
         if !(level > 0.0 && level < 1.0) {
             let expected = "a share above 0 and below 1";
             return Err(DeriveError::Domain { what: "level", value: level, expected });
@@ -108,7 +109,7 @@ impl Field<'_> {
 
 impl<'p, 'f> Profile<'p, 'f> {
     fn new(field: &'p Field<'f>, phi_rad: f64) -> Result<Self, DeriveError> {
-        let measured_rad = field.fit.region().theta_max_rad.min(FRAC_PI_2);
+        let measured_rad = field.fit.region().theta_max_rad.min(field.theta_end_rad());
         let end_rad = field.medium.inner_theta_rad(measured_rad);
         let half = (POINTS_A_LINE * field.lines()).clamp(POINTS_MIN, POINTS_MAX);
         let step_rad = end_rad / half as f64;
@@ -130,7 +131,7 @@ impl<'p, 'f> Profile<'p, 'f> {
     fn functional(&self, gamma_rad: f64) -> Result<Functional, DeriveError> {
         let phi_rad = if gamma_rad < 0.0 { self.phi_rad + PI } else { self.phi_rad };
         let node = Node::Towards { theta_rad: gamma_rad.abs(), phi_rad };
-        Ok(self.field.functional(node)?.times(libm::cos(gamma_rad)))
+        Ok(self.field.functional(node)?.times(self.field.projection(gamma_rad)))
     }
 
     fn value(&self, gamma_rad: f64) -> Result<f64, DeriveError> {

@@ -123,7 +123,8 @@ impl PartialError {
                 | FitError::Variance { index, .. }
                 | FitError::ShotNoise { index, .. }
                 | FitError::Theta { index, .. }
-                | FitError::OutsideRegion { index, .. },
+                | FitError::OutsideRegion { index, .. }
+                | FitError::OutsideSecondPlane { index, .. },
             ) => Some(index),
             Self::Fit(_) | Self::Differ { .. } => None,
         }
