@@ -18,6 +18,8 @@ pub(crate) struct ProgressLine {
     pace: Pace,
     /// Of each gain range, the last dark level, counts: good enough to look at.
     darks: Vec<f64>,
+    /// How accurate the result is so far, in words; empty where nobody has said yet.
+    accuracy: String,
 }
 
 impl ProgressLine {
@@ -35,7 +37,7 @@ impl ProgressLine {
             bar.set_style(style);
         }
         let darks = vec![0.0; setup.rig.detector.gains.len()];
-        Self { bar, rig: setup.rig.clone(), pace, darks }
+        Self { bar, rig: setup.rig.clone(), pace, darks, accuracy: String::new() }
     }
 
     /// A line of its own, above the bar, that stays.
@@ -46,6 +48,7 @@ impl ProgressLine {
     /// Shows what happened, and how far that brought the run.
     pub(crate) fn show(&mut self, happening: &Happening, progress: Progress) {
         match happening {
+            Happening::Accuracy(text) => self.accuracy = format!(" · {text}"),
             Happening::Fault(fault) => self.say(&format!("fault: {fault}")),
             Happening::Finished(_) => self.bar.finish_and_clear(),
             Happening::Progress(progress) => self.show_progress(*progress),
@@ -82,12 +85,13 @@ impl ProgressLine {
         }
         let (_, pose) = self.rig.measured(reading);
         self.bar.set_message(format!(
-            "θ {:.2}° φ {:.2}° x {:.2} mm y {:.2} mm · {}",
+            "θ {:.2}° φ {:.2}° x {:.2} mm y {:.2} mm · {}{}",
             pose.theta_rad.to_degrees(),
             pose.phi_rad.to_degrees(),
             pose.x_m * 1e3,
             pose.y_m * 1e3,
             self.radiance(reading),
+            self.accuracy,
         ));
     }
 

@@ -1,14 +1,16 @@
-//! The plan's accuracy target, `exitance_relative` of its `[stop]`: the rule that ends a run once
-//! it is met, and what is said of a run that missed it.
+//! The exitance's uncertainty so far, and the plan's target for it, `exitance_relative` of its
+//! `[stop]`: the rule that ends a run once it is met, what is said while the run goes on, and of a run
+//! that missed it.
 
 use super::acquire::Pace;
 use super::failure::Failure;
 use super::results::{Results, fit_region, optics, targets_planned};
 use super::setup::Setup;
-use super::text::percent;
+use super::text::{duration, percent};
 use crate::rig::calibration::{Calibrated, Fitted, calibrate};
 use crate::rig::{Reading, ReadingKind, Rig};
-use crate::run::{Rule, Watch};
+use crate::run::{Rule, Said, Watch};
+use crate::study::{Reach, Trend};
 
 /// A fit says something about its own misfit from this many samples a coefficient on.
 const SAMPLES_PER_COEFFICIENT: usize = 2;
@@ -18,13 +20,17 @@ const COEFFICIENTS_CHOSEN: usize = 30;
 /// eleven times the last one.
 const GROWTH: f64 = 1.1;
 
-/// The rule for a run that has these readings from earlier sessions; `None` if the plan has none.
+/// The rule for a run that has these readings from earlier sessions. In virtual time, where nobody
+/// watches and every fit would be waited for, there is none where the plan has no target.
 pub(crate) fn rule(
     setup: &Setup,
     before: Vec<Reading>,
     pace: Pace,
 ) -> Result<Option<Watch>, Failure> {
-    let Some(asked) = setup.plan.stop.exitance_relative else { return Ok(None) };
+    let asked = setup.plan.stop.exitance_relative;
+    if asked.is_none() && pace == Pace::Virtual {
+        return Ok(None);
+    }
     let mut target = Target::new(setup, asked, before);
     let rule: Rule = Box::new(move |reading| target.look(reading));
     match pace {
@@ -43,7 +49,8 @@ struct Target {
     /// What the wish leaves open, as it was chosen last, and at how many targets.
     chosen: Option<(fit::Penalised, usize)>,
     optics: Option<fit::Optics>,
-    asked: f64,
+    /// The plan's target, if it has one.
+    asked: Option<f64>,
     planned: usize,
     readings: Vec<Reading>,
     targets: usize,
@@ -51,7 +58,7 @@ struct Target {
 }
 
 impl Target {
-    fn new(setup: &Setup, asked: f64, before: Vec<Reading>) -> Self {
+    fn new(setup: &Setup, asked: Option<f64>, before: Vec<Reading>) -> Self {
         let wish = setup.plan.fit;
         let coefficients = wish.decided().map_or(COEFFICIENTS_CHOSEN, |model| model.basis.len());
         let first = coefficients.saturating_mul(SAMPLES_PER_COEFFICIENT);
@@ -70,20 +77,67 @@ impl Target {
     }
 
     /// What the rule says when this reading is taken.
-    fn look(&mut self, reading: &Reading) -> Option<String> {
+    fn look(&mut self, reading: &Reading) -> Said {
         self.readings.push(reading.clone());
         self.targets += usize::from(is_target(reading));
         if !is_target(reading) || self.targets < self.next {
-            return None;
+            return Said::Nothing;
         }
         self.next = grown(self.targets);
+        self.so_far(reading.time_s).unwrap_or(Said::Nothing)
+    }
+
+    fn so_far(&mut self, rig_s: f64) -> Option<Said> {
         let calibrated = calibrate(&self.rig, &self.readings).ok()?;
-        let u = u_relative(&self.fitted(&calibrated)?);
-        (u <= self.asked).then(|| {
-            let (asked, targets, planned) = (percent(self.asked), self.targets, self.planned);
-            format!("exitance to {asked} after {targets} of {planned} targets")
+        let trend = Trend::of(rig_s, &self.fitted(&calibrated)?.fit.exitance())?;
+        let Self { asked, targets, planned, .. } = *self;
+        Some(match asked {
+            Some(asked) if trend.u() <= asked => Said::Enough(format!(
+                "exitance to {} after {targets} of {planned} targets",
+                percent(asked)
+            )),
+            _ => Said::SoFar(said_so_far(&trend, asked)),
         })
     }
+}
+
+/// For the line that shows how far a run is.
+fn said_so_far(trend: &Trend, asked: Option<f64>) -> String {
+    let u = format!("exitance to {}", percent(trend.u()));
+    match asked.map(|asked| (percent(asked), trend.reach(asked))) {
+        None | Some((_, Reach::Met)) => u,
+        Some((asked, Reach::Never)) => format!("{u}; {asked} is out of reach of more readings"),
+        Some((asked, Reach::At(seconds))) => {
+            format!("{u}; {asked} at about {} of rig time", duration(seconds))
+        }
+    }
+}
+
+/// What more time would bring a run that has ended, in words.
+pub(crate) fn in_words(trend: &Trend, setup: &Setup) -> String {
+    let twice = format!("twice as long would bring {}", percent(trend.after(2.0)));
+    match setup.plan.stop.exitance_relative.map(|asked| (percent(asked), trend.reach(asked))) {
+        None | Some((_, Reach::Met)) => twice,
+        Some((asked, Reach::Never)) => format!("{twice}; {asked} is out of reach of more readings"),
+        Some((asked, Reach::At(seconds))) => {
+            format!("{twice}; {asked} takes {}", duration(seconds))
+        }
+    }
+}
+
+/// The same for programs.
+pub(crate) fn as_json(trend: &Trend, setup: &Setup) -> serde_json::Value {
+    let asked = setup.plan.stop.exitance_relative;
+    let target_s = asked.and_then(|asked| match trend.reach(asked) {
+        Reach::Met => Some(trend.rig_s),
+        Reach::At(seconds) => Some(seconds),
+        Reach::Never => None,
+    });
+    serde_json::json!({
+        "u_relative": trend.u(), "u_relative_shared": trend.shared,
+        "u_relative_after_twice_the_time": trend.after(2.0),
+        "target_relative": asked, "target_rig_s": target_s,
+    })
 }
 
 impl Target {

@@ -10,10 +10,12 @@ use super::derive;
 use super::report::REPORT;
 use super::results::{Results, targets_planned};
 use super::setup::Setup;
+use super::stopping;
 use super::text::{duration, percent, row, table, with_uncertainty};
 use crate::rig::Quantity;
 use crate::rig::calibration::Flag;
 use crate::run::Outcome;
+use crate::study::Trend;
 
 /// What a summary says beside the results.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +73,9 @@ impl Summary<'_> {
                 format!("{whole} (k = 1), its part not shared by all readings {independent}"),
             ));
         }
+        if let Some(trend) = Trend::of(self.rig_s, &exitance) {
+            rows.push(row("more time", stopping::in_words(&trend, self.setup)));
+        }
         if let Some(truth) = self.results.truth.filter(|truth| truth.exitance > 0.0) {
             let error = exitance.value - truth.exitance;
             let relative = percent(error / truth.exitance);
@@ -114,6 +119,9 @@ impl Summary<'_> {
                     "value": exitance.value, "u": exitance.u, "u_independent": exitance.u_independent,
                     "measured_fraction": fitted.fit.measured_fraction(),
                 });
+                if let Some(trend) = Trend::of(self.rig_s, &exitance) {
+                    object["accuracy"] = stopping::as_json(&trend, setup);
+                }
                 object[quantity.flux_key()] = json!({"value": flux.value, "u": flux.u});
                 if let Some(truth) = &results.truth {
                     object["truth"] = json!({

@@ -64,6 +64,8 @@ pub struct OwnerStatus {
     pub asked: Option<Source>,
     /// How far the run is.
     pub progress: Progress,
+    /// How accurate its result is so far, in words; empty as long as nobody has said.
+    pub accuracy: String,
 }
 
 /// The owner's side: events out, status shown.
@@ -83,6 +85,7 @@ impl Desk {
             fault: None,
             asked: None,
             progress: Progress::default(),
+            accuracy: String::new(),
         };
         Self { events: Events::default(), status: watch::Sender::new(status), is_closing: false }
     }
@@ -95,6 +98,7 @@ impl Desk {
                 fault: None,
                 asked: None,
                 progress,
+                accuracy: String::new(),
                 ..status.clone()
             };
         });
@@ -107,6 +111,7 @@ impl Desk {
     /// Shows it, and tells the listeners.
     pub(super) fn tell(&mut self, happening: Happening) {
         self.status.send_modify(|status| match &happening {
+            Happening::Accuracy(text) => status.accuracy.clone_from(text),
             Happening::Fault(fault) => status.fault = Some(fault.clone()),
             Happening::Finished(_) => status.is_running = false,
             Happening::Position(position) => status.position = *position,

@@ -17,7 +17,7 @@ use super::hardware::{Hardware, ReachError, Reached};
 use super::job::{Check, Ended, Job};
 use super::machine::{Action, Connected, Input, Machine, Program, Setup, Taken, Wish};
 use super::reading::{Taking, reading};
-use super::rule::Watch;
+use super::rule::{Said, Watch};
 use super::state::{Fault, Outcome, Position, State};
 use crate::device::{DeviceEvent, LinkLost};
 use crate::journal::{self, EventKind, JournalError, Record, Writer};
@@ -31,7 +31,7 @@ enum Woken {
     Order(Option<Order>),
     TimedOut,
     Device(DeviceEvent),
-    Rule(String),
+    Rule(Said),
     Journal,
 }
 
@@ -140,12 +140,12 @@ impl<'a> Engine<'a> {
                     None => std::future::pending().await,
                 }
             } => Woken::Device(event),
-            text = async {
+            said = async {
                 match rule {
-                    Some(rule) => rule.verdict().await,
+                    Some(rule) => rule.said().await,
                     None => std::future::pending().await,
                 }
-            } => Woken::Rule(text),
+            } => Woken::Rule(said),
             Ok(()) = self.committed.changed() => Woken::Journal,
         }
     }
@@ -160,7 +160,7 @@ impl<'a> Engine<'a> {
                     self.tell_progress();
                 }
             }
-            Woken::Rule(text) => self.conclude(text),
+            Woken::Rule(said) => self.heed(said),
             Woken::Device(event) => self.hear(event),
             Woken::Journal => {
                 let failure = self.committed.borrow_and_update().failure.clone();
@@ -373,16 +373,25 @@ impl<'a> Engine<'a> {
             self.checked.push(reading.clone());
         }
         self.course.take(&step, end_s);
-        let met = self.rule.as_mut().and_then(|rule| rule.show(&reading));
+        let said = self.rule.as_mut().map_or(Said::Nothing, |rule| rule.show(&reading));
         let here = step.rests_at(&self.hardware.rig);
         let is_late = self.course.is_late(here, &self.machine.steps_ahead());
         self.desk.tell(Happening::Reading(Box::new(reading)));
         self.tell_progress();
-        if let Some(text) = met {
-            self.conclude(text);
-        } else if is_late {
+        let is_met = matches!(said, Said::Enough(_));
+        self.heed(said);
+        if !is_met && is_late {
             let Progress { done, total, .. } = self.course.progress();
             self.conclude(format!("the rig's time is used up after {done} of {total} readings"));
+        }
+    }
+
+    /// What the rule says is told, or ends the targets.
+    fn heed(&mut self, said: Said) {
+        match said {
+            Said::Nothing => {}
+            Said::SoFar(text) => self.desk.tell(Happening::Accuracy(text)),
+            Said::Enough(text) => self.conclude(text),
         }
     }
 

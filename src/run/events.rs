@@ -25,6 +25,8 @@ pub struct RunEvent {
 /// What can happen.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Happening {
+    /// How accurate the readings so far make the result, in words.
+    Accuracy(String),
     /// A person is asked to switch the source, and then to continue.
     AskSource(Source),
     /// Something is wrong.

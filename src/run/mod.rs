@@ -29,5 +29,5 @@ pub use hardware::ReachError;
 pub use job::{Check, Ended, Job, Judge, Judgement};
 pub use machine::{Answer, OnFault, Source, Wish};
 pub use owner::{OwnerHandle, Running, StartError, own};
-pub use rule::{Rule, Watch};
+pub use rule::{Rule, Said, Watch};
 pub use state::{Doubt, Fault, LEGAL, Outcome, Position, State};

@@ -12,6 +12,7 @@ mod prior;
 mod score;
 mod search;
 mod strategy;
+mod trend;
 
 pub use demand::{Demand, Shortfall};
 pub use forecast::{Forecast, ForecastError};
@@ -25,3 +26,4 @@ pub use prior::{Feature, Prior};
 pub use score::Score;
 pub use search::{Candidate, Considered, Found, Search, SearchError};
 pub use strategy::Strategy;
+pub use trend::{Reach, Trend};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gonio::plan::{Prediction, Step};
 use gonio::rig::ReadingKind;
-use gonio::run::{Happening, Job, OnFault, Outcome, Progress, State, Watch, Wish};
+use gonio::run::{Happening, Job, OnFault, Outcome, Progress, Said, State, Watch, Wish};
 
 use crate::bench::{Folder, device, owner, rig, steps, wait_for_readings, wait_for_state};
 
@@ -80,11 +80,19 @@ async fn a_rule_sees_every_reading_and_leaves_what_the_plan_closes_with() {
     job.rule = Some(Watch::inline(Box::new(move |reading| {
         assert_eq!(reading.id, seen);
         seen += 1;
-        (seen == 3).then(|| "three".to_owned())
+        match seen {
+            2 => Said::SoFar("two".to_owned()),
+            3 => Said::Enough("three".to_owned()),
+            _ => Said::Nothing,
+        }
     })));
+    let mut events = owner.subscribe();
     let running = owner.start(job, folder.journal(&steps)).await.unwrap();
     let ended = running.ended().await.unwrap();
     assert_eq!(ended.outcome, Outcome::Reached("three".into()));
+    let told = std::iter::from_fn(|| events.try_recv().ok());
+    let accuracies = told.filter(|event| event.happening == Happening::Accuracy("two".into()));
+    assert_eq!(accuracies.count(), 1);
     let reader = gonio::journal::Reader::open(&folder.path()).unwrap();
     drop(ended.journal);
     let readings = reader.readings(gonio::journal::Order::Taken).unwrap();

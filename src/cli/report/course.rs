@@ -9,6 +9,7 @@ use crate::export::AccuracyPoint;
 use crate::report::{Chart, Picture, Section, Series, Stroke};
 use crate::rig::calibration::Sample;
 use crate::rig::{Reading, ReadingKind};
+use crate::study::{Reach, Trend};
 
 /// A unit of time that a run's axis can do with.
 #[derive(Debug, Clone, Copy)]
@@ -224,33 +225,27 @@ pub(super) fn accuracy(setup: &Setup, results: &Results) -> Option<Section> {
 
 /// What twice the time would buy, and what the plan's target would cost.
 fn outlook(results: &Results, last: &AccuracyPoint, target: Option<f64>) -> Vec<String> {
-    let relative = |u: f64| u / last.exitance.value;
-    let (u, independent) = (relative(last.exitance.u), relative(last.exitance.u_independent));
-    let shared = libm::sqrt((u * u - independent * independent).max(0.0));
-    let after = |factor: f64| libm::hypot(shared, independent / libm::sqrt(factor));
+    let Some(trend) = Trend::of(last.rig_s, &last.exitance) else { return Vec::new() };
     let mut said = vec![format!(
         "After {} the uncertainty is {}, of which {} is shared by all readings. Twice the time would \
          bring {}, if the independent part goes on to fall as the square root of time.",
         duration(last.rig_s),
-        percent(u),
-        percent(shared),
-        percent(after(2.0))
+        percent(trend.u()),
+        percent(trend.shared),
+        percent(trend.after(2.0))
     )];
     if let Some(target) = target {
         let asked = percent(target);
-        said.push(if u <= target {
-            format!("The plan's target of {asked} is met.")
-        } else if shared >= target {
-            format!(
+        said.push(match trend.reach(target) {
+            Reach::Met => format!("The plan's target of {asked} is met."),
+            Reach::Never => format!(
                 "The plan's target of {asked} can't be met by more time: what all readings \
-                     share is more than that."
-            )
-        } else {
-            let factor = independent * independent / (target * target - shared * shared);
-            format!(
+                 share is more than that."
+            ),
+            Reach::At(seconds) => format!(
                 "The plan's target of {asked} would be met after about {} by the same rule.",
-                duration(last.rig_s * factor)
-            )
+                duration(seconds)
+            ),
         });
     }
     if results.fitted.as_ref().is_ok_and(|fitted| fitted.fit.excess_rms() > 0.0) {

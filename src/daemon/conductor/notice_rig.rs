@@ -29,7 +29,10 @@ impl<W: Workshop> Conductor<W> {
         if std::mem::replace(&mut self.told, progress) == progress {
             return Ok(());
         }
-        let text = format!("{} of {} readings", progress.done, progress.total);
+        let mut text = format!("{} of {} readings", progress.done, progress.total);
+        if !self.seen.accuracy.is_empty() {
+            text.extend(["; ", &self.seen.accuracy]);
+        }
         self.book.tell(Kind::Progress, self.tenant_id(), &text, Some(progress)).await
     }
 
