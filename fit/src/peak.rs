@@ -2,7 +2,7 @@
 //! through, then a search downhill in step size from the best places. Deterministic.
 
 use crate::basis::dot;
-use crate::{Estimate, Fit, Ray, Region};
+use crate::{Chart, Estimate, Fit, Ray, Region};
 use std::f64::consts::TAU;
 
 /// The largest value of the field within the region and its cone.
@@ -63,7 +63,10 @@ impl Fit {
     fn climb(&self, start: Place) -> (Place, f64) {
         let basis = self.functions();
         let mut scratch = basis.scratch();
-        let r_max = disk_radius(self.region(), self.region().theta_max_rad);
+        let r_max = match self.region().chart {
+            Chart::TwoPlane { .. } => core::f64::consts::SQRT_2,
+            _ => disk_radius(self.region(), self.region().theta_max_rad),
+        };
         let mut at = |place: Place| {
             basis.value(self.coefficients(), &place.ray(self.region()), &mut scratch)
         };
@@ -100,6 +103,12 @@ impl Place {
 
     fn ray(self, region: &Region) -> Ray {
         let between = |t: f64, (from, to): (f64, f64)| 0.5 * ((1.0 - t) * from + (1.0 + t) * to);
+        if let Chart::TwoPlane { distance_m, s_m, t_m } = region.chart {
+            // The disk holds the second rectangle, scaled to [-1, 1]².
+            let first = (between(self.a, region.x_m), between(self.b, region.y_m));
+            let [s, t] = [self.u, self.v].map(|t| t.clamp(-1.0, 1.0));
+            return Ray::between(first, (between(s, s_m), between(t, t_m)), distance_m);
+        }
         Ray {
             x_m: between(self.a, region.x_m),
             y_m: between(self.b, region.y_m),
@@ -151,7 +160,11 @@ fn directions(region: &Region, degree: usize) -> Vec<(f64, f64)> {
     let spokes = 4 * (degree + 1);
     let mut points = vec![(0.0, 0.0)];
     for ring in 1..=rings {
-        let r = disk_radius(region, region.theta_max_rad * ring as f64 / rings as f64);
+        let part = ring as f64 / rings as f64;
+        let r = match region.chart {
+            Chart::TwoPlane { .. } => core::f64::consts::SQRT_2 * part,
+            _ => disk_radius(region, region.theta_max_rad * part),
+        };
         for spoke in 0..spokes {
             let (sin, cos) = libm::sincos(TAU * spoke as f64 / spokes as f64);
             points.push((r * cos, r * sin));

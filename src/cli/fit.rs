@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use fit::{AngularKind, Optics, Region, Resolves, Wish};
 
 use super::args::FitArgs;
+use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
@@ -17,23 +18,21 @@ use super::setup::rig_at;
 use super::summary::{field_rows, model_rows};
 use super::text::{row, table};
 use crate::export::{
-    FitFile, InputSamples, RayColumns, read_rays, read_samples, write_at, write_atomically,
+    FitFile, InputSamples, ListedRay, RayChart, read_rays, read_samples_in, write_at,
+    write_atomically,
 };
 use crate::plan::Wanted;
 
-/// A region's cone ends this far beyond the outermost sample of a CSV at most.
-const THETA_MAX_RAD: f64 = core::f64::consts::FRAC_PI_2;
 pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
-pub(super) const CSV_HELP: &str = "expected a header with x_mm, y_mm, theta_deg, phi_deg and for example \
-                        radiance_w_per_m2_sr, commas between, a point for the decimals";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
 
 /// Fits again and prints what came out.
 pub(crate) fn fit(args: &FitArgs) -> Outcome {
-    let rays = args.at.as_deref().map(rays_at).transpose()?;
-    let wanted = derive::wanted(&args.derive)?;
+    let chart = args.chart.ray_chart()?;
+    let rays = args.at.as_deref().map(|path| rays_at(chart, path)).transpose()?;
+    let wanted = derive::wanted(&args.derive, chart.is_all_round())?;
     if args.merge {
         return partial::merge(args, rays, &wanted);
     }
@@ -48,9 +47,10 @@ pub(crate) fn fit(args: &FitArgs) -> Outcome {
 }
 
 /// The rays at which the fit shall be evaluated.
-fn rays_at(path: &Path) -> Result<Vec<RayColumns>, Failure> {
-    let help = "expected a header with x_mm, y_mm, theta_deg and phi_deg, and a row for each ray";
-    read_rays(&read_csv(path)?)
+fn rays_at(chart: RayChart, path: &Path) -> Result<Vec<ListedRay>, Failure> {
+    let names = chart.names().join(", ");
+    let help = format!("expected a header with {names}, and a row for each ray");
+    read_rays(chart, &read_csv(path)?)
         .map_err(|error| Failure::with_help(format!("{}: {error}", path.display()), help))
 }
 
@@ -95,7 +95,8 @@ fn kind_named(name: &str) -> Result<AngularKind, Failure> {
     })
 }
 
-fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
+fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
+    args.chart.demand_none()?;
     if args.u_relative.is_some() {
         return Err(Failure::with_help(
             "--u-relative: a run's samples have uncertainties of their own",
@@ -135,20 +136,21 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> 
     show(args, rays, &file, Some(&path))
 }
 
-fn fit_csv(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
+fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
     let shown = args.source.display();
     let bytes = read_csv(&args.source)?;
-    let input = read_samples(&bytes)
-        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), CSV_HELP))?;
+    let chart = args.chart.ray_chart()?;
+    let input = read_samples_in(chart, &bytes)
+        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), csv_help(chart)))?;
     if let Some(u) = args.u_relative
         && !(u > 0.0 && u.is_finite())
     {
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
-    let region = region_of(&input);
+    let region = args.chart.region(chart, input.samples.iter().map(|sample| sample.ray.ray()));
     let wish = wished(args, Wish::default())?;
     let samples = input.fit_samples(args.u_relative);
-    let optics = args.rig.as_deref().map(optics_of).transpose()?;
+    let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
     let (model, choice) =
         fit::choose(&samples, &region, &wish, optics.as_ref()).map_err(refused)?;
@@ -199,20 +201,6 @@ pub(super) fn optics_of(path: &Path) -> Result<Optics, Failure> {
     Ok(Optics { beam, outline: None })
 }
 
-/// The rectangle and the cone that hold all samples.
-fn region_of(input: &InputSamples) -> Region {
-    let extent = |value: fn(&fit::Ray) -> f64| {
-        let values = input.samples.iter().map(|sample| value(&sample.ray.ray()));
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
-    };
-    let (_, theta_max_rad) = extent(|ray| ray.theta_rad);
-    Region::surface(
-        extent(|ray| ray.x_m),
-        extent(|ray| ray.y_m),
-        theta_max_rad.clamp(f64::MIN_POSITIVE, THETA_MAX_RAD),
-    )
-}
-
 fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
     let shown = path.display();
     let cannot = |error: std::io::Error| {
@@ -233,14 +221,18 @@ fn read_csv(path: &Path) -> Result<Vec<u8>, Failure> {
 /// Prints the fit: at listed rays where those are asked for, as JSON, or as a table.
 pub(super) fn show(
     args: &FitArgs,
-    rays: Option<Vec<RayColumns>>,
+    rays: Option<Vec<ListedRay>>,
     file: &FitFile<'_>,
     written: Option<&Path>,
 ) -> Outcome {
     if let Some(rays) = rays {
         note_rays_outside(&rays, file.fit.region());
-        let estimates = rays.into_iter().map(|ray| (ray, file.fit.radiance(&ray.ray())));
-        write_out(|out| write_at(out, file.quantity, estimates))?;
+        let estimates = rays.into_iter().map(|listed| {
+            let estimate = file.fit.radiance(&listed.ray);
+            (listed, estimate)
+        });
+        let chart = args.chart.ray_chart()?;
+        write_out(|out| write_at(out, file.quantity, chart, estimates))?;
     } else if args.json {
         write_out(|out| file.write(out))?;
     } else {
@@ -262,14 +254,8 @@ pub(super) fn beside(path: &Path) -> &Path {
 }
 
 /// The fit's functions go on beyond what was measured, and say so in their u only in part.
-fn note_rays_outside(rays: &[RayColumns], region: &Region) {
-    let is_outside = |ray: &fit::Ray| {
-        let is_beyond = |value: f64, (low, high): (f64, f64)| value < low || value > high;
-        is_beyond(ray.x_m, region.x_m)
-            || is_beyond(ray.y_m, region.y_m)
-            || ray.theta_rad > region.theta_max_rad
-    };
-    let outside = rays.iter().filter(|ray| is_outside(&ray.ray())).count();
+fn note_rays_outside(rays: &[ListedRay], region: &Region) {
+    let outside = rays.iter().filter(|listed| !region.covers(&listed.ray)).count();
     if outside > 0 {
         let of = rays.len();
         note(&format!("note: {outside} of {of} rays lie outside the region that was measured"));

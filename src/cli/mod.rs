@@ -4,6 +4,7 @@
 mod acquire;
 mod args;
 pub mod calc;
+mod chart;
 mod client;
 mod daemon;
 mod derive;

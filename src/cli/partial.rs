@@ -10,14 +10,15 @@ use fit::partial::{Accumulator, Partial, Weighting};
 use fit::{Optics, Penalised, Region, Wish};
 
 use super::args::FitArgs;
+use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
-use super::fit::{CSV_HELP, FIT_HELP, beside, optics_of, show, wished};
+use super::fit::{FIT_HELP, beside, optics_of, show, wished};
 use super::output::say;
 use super::results::{fit_region, optics, read_run};
 use super::text::{row, table};
 use crate::export::{
-    BlockError, FitFile, InputSamples, PartialFile, RayColumns, ReadPartial, read_sample_blocks,
+    BlockError, FitFile, InputSamples, ListedRay, PartialFile, ReadPartial, read_sample_blocks,
     write_atomically,
 };
 use crate::plan::Wanted;
@@ -53,12 +54,7 @@ pub(super) fn partial(args: &FitArgs) -> Outcome {
 }
 
 fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
-    if args.x_mm.is_some() || args.y_mm.is_some() || args.theta_max_deg.is_some() {
-        return Err(Failure::with_help(
-            "--x-mm, --y-mm, --theta-max-deg: a run's plan says what it stands for",
-            "leave them out; they are for a CSV",
-        ));
-    }
+    args.chart.demand_none()?;
     let (setup, _, readings) = read_run(&args.source)?;
     let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
     let model = decided(wished(args, setup.plan.fit)?)?;
@@ -109,29 +105,31 @@ struct Share<'a> {
 
 fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
     let shown = args.source.display();
-    let (Some(x_mm), Some(y_mm), Some(theta_max_deg)) = (args.x_mm, args.y_mm, args.theta_max_deg)
-    else {
+    let chart = args.chart.ray_chart()?;
+    let Some(region) = args.chart.whole_region(chart) else {
         return Err(Failure::with_help("--partial of a CSV: no region", REGION_HELP));
     };
-    let metres = |(from, to): (f64, f64)| (from * 1e-3, to * 1e-3);
-    let optics = args.rig.as_deref().map(optics_of).transpose()?;
+    let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
     let mut share = Share {
-        region: Region::surface(metres(x_mm), metres(y_mm), theta_max_deg.to_radians()),
-        model: decided(wished(args, DEGREES)?)?,
+        region,
+        model: decided(wished(args, DEGREES)?.in_chart(&region.chart))?,
         optics: optics.as_ref(),
         begun: None,
         n_flagged: 0,
         n_excluded: 0,
     };
     let file = File::open(&args.source).map_err(|error| {
-        Failure::with_help(format!("{shown}: cannot be read: {error}"), CSV_HELP)
+        Failure::with_help(format!("{shown}: cannot be read: {error}"), csv_help(chart))
     })?;
-    read_sample_blocks(BufReader::new(file), |block| share.take(&block)).map_err(|error| {
-        let help = if matches!(error, BlockError::Taken(_)) { REGION_HELP } else { CSV_HELP };
+    let blocks = BufReader::new(file);
+    read_sample_blocks(chart, blocks, |block| share.take(&block)).map_err(|error| {
+        let is_taken = matches!(error, BlockError::Taken(_));
+        let help = if is_taken { REGION_HELP.to_owned() } else { csv_help(chart) };
         Failure::with_help(format!("{shown}: {error}"), help)
     })?;
-    let (accumulator, quantity) =
-        share.begun.ok_or_else(|| Failure::with_help(format!("{shown}: no samples"), CSV_HELP))?;
+    let (accumulator, quantity) = share
+        .begun
+        .ok_or_else(|| Failure::with_help(format!("{shown}: no samples"), csv_help(chart)))?;
     Ok(PartialFile {
         partial: accumulator.finish(),
         quantity,
@@ -161,7 +159,7 @@ impl Share<'_> {
 }
 
 /// Merges shares and shows the fit of all.
-pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wanted]) -> Outcome {
+pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
     let mut paths = std::iter::once(&args.source).chain(&args.further);
     let Some(first_path) = paths.next() else { return Ok(ExitCode::SUCCESS) };
     let first = read(first_path)?;
@@ -181,6 +179,9 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<RayColumns>>, wanted: &[Wan
         n_excluded += part.n_excluded;
         simulated |= part.simulated;
         count += 1;
+    }
+    if rays.is_some() {
+        args.chart.demand_of(&first.partial.parts().region)?;
     }
     let closed = whole
         .close(args.u_relative)

@@ -1,6 +1,7 @@
 //! The last thing that a run prints: what was measured, in which time, with which uncertainty,
 //! and on a simulated rig how far from the truth.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use fit::{Angular, BasisSpec, BeamRows, Choice, Fit, Penalty, Position, Resolves, Width};
@@ -12,6 +13,7 @@ use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::stopping;
 use super::text::{duration, percent, row, table, with_uncertainty};
+use crate::export::charted;
 use crate::rig::Quantity;
 use crate::rig::calibration::Flag;
 use crate::run::Outcome;
@@ -255,16 +257,39 @@ fn resolves_in_words(resolves: Resolves) -> String {
 }
 
 /// What a fit says of its field, whoever asks.
+/// Those of a chart other than the surface one.
+fn charted_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
+    let mut rows = vec![row("chart", fit.region().chart.name().to_owned())];
+    for one in charted(fit, quantity) {
+        let estimate = one.derived.estimate;
+        let mut said = with_uncertainty(estimate.value, estimate.u, one.unit);
+        if let Some((theta_rad, phi_rad)) = one.towards {
+            let (theta_deg, phi_deg) = (theta_rad.to_degrees(), phi_rad.to_degrees());
+            let _ = write!(said, ", theta {theta_deg:.1}°, phi {phi_deg:.1}°");
+        }
+        rows.push(row(one.name, said));
+        let part = one.derived.measured_fraction.filter(|fraction| *fraction < 1.0 - 1e-9);
+        if let Some(fraction) = part {
+            rows.push(row("", format!("{} of it from where it was measured", percent(fraction))));
+        }
+    }
+    rows
+}
+
 pub(crate) fn field_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
     let [radiance_unit, exitance_unit, flux_unit] = quantity.units();
-    let (exitance, flux) = (fit.exitance(), fit.flux());
-    let mut rows =
-        vec![row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit))];
-    if let Some(fraction) = fit.measured_fraction() {
-        let name = format!("  within {:.0}°", fit.region().theta_max_rad.to_degrees());
-        rows.push(row(&name, format!("{} of the exitance", percent(fraction))));
+    let mut rows = Vec::new();
+    if fit.region().chart == fit::Chart::Surface {
+        let (exitance, flux) = (fit.exitance(), fit.flux());
+        rows.push(row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)));
+        if let Some(fraction) = fit.measured_fraction() {
+            let name = format!("  within {:.0}°", fit.region().theta_max_rad.to_degrees());
+            rows.push(row(&name, format!("{} of the exitance", percent(fraction))));
+        }
+        rows.push(row("flux", with_uncertainty(flux.value, flux.u, flux_unit)));
+    } else {
+        rows.extend(charted_rows(fit, quantity));
     }
-    rows.push(row("flux", with_uncertainty(flux.value, flux.u, flux_unit)));
     rows.extend(fit.beam().map(|beam| row("beam", in_words(beam))));
     let excess = fit.excess_rms();
     if excess > 0.0 {

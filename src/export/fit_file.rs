@@ -3,12 +3,13 @@
 use std::io::{self, Write};
 
 use fit::{
-    Angular, BasisSpec, BeamRows, Choice, Contribution, Estimate, Fit, Limit, Penalty, Position,
-    Resolves, Width,
+    Angular, BasisSpec, BeamRows, Chart, Choice, Contribution, Estimate, Fit, Limit, Penalty,
+    Position, Resolves, Width,
 };
 use serde_json::{Map, Value, json};
 
 use super::DerivedQuantity;
+use super::charted::{put_charted, ray_json, region_json};
 use crate::rig::Quantity;
 
 /// What fit.json says. Numbers that do not exist are `null`.
@@ -84,24 +85,17 @@ impl FitFile<'_> {
 
     fn object(&self) -> Map<String, Value> {
         let Self { fit, quantity, .. } = self;
-        let region = fit.region();
         let mut object = Map::new();
         let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
         put("quantity", json!(quantity.name()));
         put("simulated", json!(self.simulated));
+        put("chart", json!(fit.region().chart.name()));
         put("basis", basis(fit.basis(), Some(fit.names())));
         put("penalty", json!({"power": fit.penalty().power, "strength": fit.penalty().strength}));
         put("truncation", json!(fit.model().truncation));
         put("choice", self.choice.map_or(Value::Null, choice));
         put("resolves", self.resolves.map_or(Value::Null, resolves));
-        put(
-            "region",
-            json!({
-                "x_mm": [region.x_m.0 * 1e3, region.x_m.1 * 1e3],
-                "y_mm": [region.y_m.0 * 1e3, region.y_m.1 * 1e3],
-                "theta_max_deg": region.theta_max_rad.to_degrees(),
-            }),
-        );
+        put("region", region_json(fit.region()));
         put("coefficients", json!(fit.coefficients()));
         put("covariance", json!(fit.covariance()));
         put("condition", json!(fit.condition()));
@@ -115,9 +109,14 @@ impl FitFile<'_> {
         put("n_flagged", json!(self.n_flagged));
         put("n_excluded", json!(self.n_excluded));
         put("notes", json!(self.notes));
-        put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
-        put("uncertainty_budget_exitance_independent", budget(self.independent));
-        self.put_derived(&mut object);
+        if fit.region().chart == Chart::Surface {
+            put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
+            put("uncertainty_budget_exitance_independent", budget(self.independent));
+            self.put_derived(&mut object);
+        } else {
+            put_charted(fit, *quantity, &mut object);
+        }
+        self.put_peak(&mut object);
         let derived = self.derived.iter().map(|quantity| quantity.json(self.quantity));
         object.insert("derived".to_owned(), derived.collect());
         if let Some(truth) = self.truth {
@@ -139,8 +138,12 @@ impl FitFile<'_> {
         let within = fit.exitance_within(fit.region().theta_max_rad).map_or(Value::Null, estimate);
         object.insert(quantity.exitance_within_region_key().to_owned(), within);
         object.insert(quantity.flux_key().to_owned(), estimate(fit.flux()));
+    }
+
+    fn put_peak(&self, object: &mut Map<String, Value>) {
+        let Self { fit, quantity, .. } = self;
         let peak = fit.peak();
-        let mut at = at(peak.ray);
+        let mut at = ray_json(peak.ray, &fit.region().chart);
         at["value"] = json!(peak.radiance.value);
         at["u"] = json!(peak.radiance.u);
         at["u_independent"] = json!(peak.radiance.u_independent);
@@ -152,7 +155,7 @@ impl FitFile<'_> {
         let is_bright = truth.exitance > 0.0;
         let fraction = is_bright.then(|| truth.exitance_within_region / truth.exitance);
         let peak = truth.peak.map_or(Value::Null, |peak| {
-            let mut at = at(peak.ray);
+            let mut at = ray_json(peak.ray, &Chart::Surface);
             at["value"] = json!(peak.value);
             at
         });
@@ -261,15 +264,6 @@ fn beam(rows: BeamRows) -> Value {
 
 fn estimate(Estimate { value, u, u_independent }: Estimate) -> Value {
     json!({"value": value, "u": u, "u_independent": u_independent})
-}
-
-fn at(ray: fit::Ray) -> Value {
-    json!({
-        "x_mm": ray.x_m * 1e3,
-        "y_mm": ray.y_m * 1e3,
-        "theta_deg": ray.theta_rad.to_degrees(),
-        "phi_deg": ray.phi_rad.to_degrees(),
-    })
 }
 
 fn write_rows(out: &mut impl Write, rows: &[Value]) -> io::Result<()> {

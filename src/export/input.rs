@@ -8,8 +8,8 @@ use std::io::{self, Write};
 use fit::{Estimate, Noise};
 use radiometry::direction;
 
-use super::RayColumns;
 use super::number::number;
+use super::{ListedRay, RayChart, RayColumns};
 use crate::rig::Quantity;
 use crate::rig::calibration::{Flag, Flags};
 
@@ -96,8 +96,13 @@ pub enum CsvError {
 /// Reads samples: `x_mm`, `y_mm`, `theta_deg`, `phi_deg` and one column of values, named after its
 /// quantity as in samples.csv; with a column `u_` of that name, the samples' uncertainty.
 pub fn read_samples(bytes: &[u8]) -> Result<InputSamples, CsvError> {
+    read_samples_in(RayChart::Surface, bytes)
+}
+
+/// As [`read_samples`], with the ray's columns of a chart.
+pub fn read_samples_in(chart: RayChart, bytes: &[u8]) -> Result<InputSamples, CsvError> {
     let mut table = Table::open(bytes)?;
-    let rays = table.ray_columns()?;
+    let rays = table.ray_columns(chart)?;
     let (quantity, value) = table.quantity()?;
     let u = table.find(&format!("u_{}", quantity.radiance_column()))?;
     let flags = table.find("flags")?;
@@ -120,13 +125,13 @@ pub fn read_samples(bytes: &[u8]) -> Result<InputSamples, CsvError> {
     if samples.is_empty() { Err(CsvError::NoRows) } else { Ok(InputSamples { quantity, samples }) }
 }
 
-/// Reads rays: `x_mm`, `y_mm`, `theta_deg`, `phi_deg`.
-pub fn read_rays(bytes: &[u8]) -> Result<Vec<RayColumns>, CsvError> {
+/// Reads rays by a chart's columns.
+pub fn read_rays(chart: RayChart, bytes: &[u8]) -> Result<Vec<ListedRay>, CsvError> {
     let mut table = Table::open(bytes)?;
-    let columns = table.ray_columns()?;
+    let columns = table.columns_of(chart)?;
     let mut rays = Vec::new();
     while let Some(row) = table.next_row(rays.len())? {
-        rays.push(row.ray(&columns)?);
+        rays.push(row.listed(&columns)?);
     }
     if rays.is_empty() { Err(CsvError::NoRows) } else { Ok(rays) }
 }
@@ -136,15 +141,16 @@ pub fn read_rays(bytes: &[u8]) -> Result<Vec<RayColumns>, CsvError> {
 pub fn write_at(
     out: impl Write,
     quantity: Quantity,
-    rays: impl IntoIterator<Item = (RayColumns, Estimate)>,
+    chart: RayChart,
+    rays: impl IntoIterator<Item = (ListedRay, Estimate)>,
 ) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let radiance = quantity.radiance_column();
-    let [x, y, theta, phi] = RayColumns::NAMES;
     let (u, u_independent) = (format!("u_{radiance}"), format!("u_independent_{radiance}"));
-    csv.write_record([x, y, theta, phi, radiance, &u, &u_independent])?;
+    let values = [radiance, &u, &u_independent];
+    csv.write_record(chart.names().iter().copied().chain(values))?;
     for (ray, Estimate { value, u, u_independent }) in rays {
-        let fields = ray.numbers().into_iter().chain([value, u, u_independent]);
+        let fields = ray.numbers.into_iter().chain([value, u, u_independent]);
         csv.write_record(fields.map(number))?;
     }
     csv.flush()
@@ -228,6 +234,12 @@ struct Lines<'b> {
     line: u64,
 }
 
+/// Columns that name a ray.
+struct Rays {
+    chart: RayChart,
+    columns: Vec<Column>,
+}
+
 struct Column {
     place: usize,
     name: String,
@@ -279,9 +291,25 @@ impl<'b> Table<'b> {
         Ok(place.map(|place| Column { place, name: name.to_owned() }))
     }
 
-    fn ray_columns(&self) -> Result<[Column; 4], CsvError> {
-        let [x, y, theta, phi] = RayColumns::NAMES.map(|name| self.need(name));
-        Ok([x?, y?, theta?, phi?])
+    /// The columns of a ray: the chart's own, or between planes the surface chart's where there is
+    /// no `u_mm`.
+    fn ray_columns(&self, chart: RayChart) -> Result<Rays, CsvError> {
+        match chart {
+            RayChart::TwoPlane { .. } if self.find("u_mm")?.is_none() => {
+                let has_surface = self.find("x_mm")?.is_some();
+                if has_surface {
+                    self.columns_of(RayChart::Surface)
+                } else {
+                    self.columns_of(chart)
+                }
+            }
+            _ => self.columns_of(chart),
+        }
+    }
+
+    fn columns_of(&self, chart: RayChart) -> Result<Rays, CsvError> {
+        let columns: Result<_, _> = chart.names().iter().map(|name| self.need(name)).collect();
+        Ok(Rays { chart, columns: columns? })
     }
 
     fn need(&self, name: &str) -> Result<Column, CsvError> {
@@ -308,17 +336,45 @@ impl<'b> Table<'b> {
 }
 
 impl Row<'_> {
-    fn ray(&self, [x, y, theta, phi]: &[Column; 4]) -> Result<RayColumns, CsvError> {
-        let phi_deg = self.number(phi, "an angle in (-180, 180], or in [0, 360]", |phi| {
-            (-PHI_DEG_MAX..=PHI_DEG_MAX).contains(&phi)
-        })?;
-        Ok(RayColumns {
-            x_mm: self.number(x, "a finite number", f64::is_finite)?,
-            y_mm: self.number(y, "a finite number", f64::is_finite)?,
-            theta_deg: self
-                .number(theta, "an angle in [0, 90]", |theta| (0.0..=90.0).contains(&theta))?,
-            phi_deg: direction::wrap_deg(phi_deg),
+    fn ray(&self, rays: &Rays) -> Result<RayColumns, CsvError> {
+        let number = |place: usize| self.ray_number(rays, place);
+        Ok(match rays.chart {
+            RayChart::Surface | RayChart::Perpendicular => RayColumns {
+                x_mm: number(0)?,
+                y_mm: number(1)?,
+                theta_deg: number(2)?,
+                phi_deg: number(3)?,
+            },
+            RayChart::Environment => {
+                let (theta_deg, phi_deg) = (number(0)?, number(1)?);
+                RayColumns { x_mm: 0.0, y_mm: 0.0, theta_deg, phi_deg }
+            }
+            RayChart::TwoPlane { distance_m } => {
+                let numbers = [number(0)?, number(1)?, number(2)?, number(3)?];
+                RayChart::between(distance_m, numbers)
+            }
         })
+    }
+
+    fn listed(&self, rays: &Rays) -> Result<ListedRay, CsvError> {
+        let numbers = (0..rays.columns.len()).map(|place| self.ray_number(rays, place));
+        Ok(ListedRay { numbers: numbers.collect::<Result<_, _>>()?, ray: self.ray(rays)?.ray() })
+    }
+
+    /// A number of a ray, by the name of its column.
+    fn ray_number(&self, rays: &Rays, place: usize) -> Result<f64, CsvError> {
+        let column = &rays.columns[place];
+        match column.name.as_str() {
+            "theta_deg" => self.number(column, rays.chart.theta_expected(), |theta| {
+                (0.0..=rays.chart.theta_end_deg()).contains(&theta)
+            }),
+            "phi_deg" => {
+                let expected = "an angle in (-180, 180], or in [0, 360]";
+                let within = |phi: f64| (-PHI_DEG_MAX..=PHI_DEG_MAX).contains(&phi);
+                self.number(column, expected, within).map(direction::wrap_deg)
+            }
+            _ => self.number(column, "a finite number", f64::is_finite),
+        }
     }
 
     fn number(

@@ -5,7 +5,8 @@
 
 use std::io::{self, Read};
 
-use super::input::{CsvError, InputSamples, read_samples};
+use super::RayChart;
+use super::input::{CsvError, InputSamples, read_samples_in};
 
 /// Why a file's samples did not all come.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +24,7 @@ pub enum BlockError<E> {
 
 /// Hands the samples of a CSV on, block by block, and their lines with them.
 pub fn read_sample_blocks<E>(
+    chart: RayChart,
     mut input: impl Read,
     mut take: impl FnMut(InputSamples) -> Result<(), E>,
 ) -> Result<(), BlockError<E>> {
@@ -41,9 +43,9 @@ pub fn read_sample_blocks<E>(
         let rest = text.split_off(end);
         let lines = text.split(|byte| *byte == b'\n').count() as u64 - 1;
         let before = match &header {
-            None => read_samples(&text),
+            None => read_samples_in(chart, &text),
             // The header's line stands before the block's first.
-            Some(header) => read_samples(&[header, &text[..]].concat())
+            Some(header) => read_samples_in(chart, &[header, &text[..]].concat())
                 .map(|samples| samples.later(passed - 1))
                 .map_err(|error| error.later(passed - 1)),
         };
@@ -88,6 +90,7 @@ const BLOCK_BYTES: usize = if cfg!(test) { 200 } else { 4 << 20 };
 
 #[cfg(test)]
 mod tests {
+    use super::super::read_samples;
     use super::*;
 
     const HEADER: &str = "x_mm,y_mm,theta_deg,phi_deg,radiance_w_per_m2_sr,note\n";
@@ -99,7 +102,7 @@ mod tests {
 
     fn read(text: &str) -> Result<Vec<super::super::InputSample>, BlockError<String>> {
         let mut all = Vec::new();
-        read_sample_blocks(text.as_bytes(), |block| {
+        read_sample_blocks(RayChart::Surface, text.as_bytes(), |block| {
             all.extend(block.samples);
             Ok::<(), String>(())
         })

@@ -8,6 +8,7 @@
 
 mod accuracy;
 mod atomic;
+mod charted;
 mod coverage;
 mod derived;
 mod document;
@@ -17,6 +18,7 @@ mod input;
 mod input_blocks;
 mod number;
 mod partial_file;
+mod ray_chart;
 mod readings;
 mod samples;
 mod samples_meta;
@@ -25,14 +27,18 @@ mod tests;
 
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
+pub use charted::{Charted, charted};
 pub use coverage::write_coverage;
 pub use derived::{DerivedKind, DerivedOutcome, DerivedQuantity, DerivedTable};
 pub use document::with_section;
 pub use fit_file::{FitFile, TruePeak, Truth};
 pub use frontier::write_frontier;
-pub use input::{CsvError, InputSample, InputSamples, read_rays, read_samples, write_at};
+pub use input::{
+    CsvError, InputSample, InputSamples, read_rays, read_samples, read_samples_in, write_at,
+};
 pub use input_blocks::{BlockError, read_sample_blocks};
 pub use partial_file::{PartialFile, PartialFileError, PartialsDiffer, ReadPartial};
+pub use ray_chart::{ListedRay, RayChart};
 pub use readings::write_readings;
 pub use samples::{RayColumns, write_samples};
 pub use samples_meta::SamplesMeta;

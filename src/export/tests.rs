@@ -102,7 +102,7 @@ proptest! {
     #[test]
     fn arbitrary_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
         let _ = read_samples(&bytes);
-        let _ = read_rays(&bytes);
+        let _ = read_rays(RayChart::Surface, &bytes);
     }
 
     #[test]
@@ -139,8 +139,16 @@ fn a_bad_file_is_refused_with_line_column_and_remedy() {
             expected a finite number",
         ),
         ("0,inf,0,0,1,0.1", "line 2, column y_mm: \"inf\"; expected a finite number"),
-        ("0,0,90.5,0,1,0.1", "line 2, column theta_deg: \"90.5\"; expected an angle in [0, 90]"),
-        ("0,0,-1,0,1,0.1", "line 2, column theta_deg: \"-1\"; expected an angle in [0, 90]"),
+        (
+            "0,0,90.5,0,1,0.1",
+            "line 2, column theta_deg: \"90.5\"; expected an angle in [0, 90] \
+            (to 180 with --chart perpendicular or --chart environment)",
+        ),
+        (
+            "0,0,-1,0,1,0.1",
+            "line 2, column theta_deg: \"-1\"; expected an angle in [0, 90] \
+            (to 180 with --chart perpendicular or --chart environment)",
+        ),
         (
             "0,0,0,361,1,0.1",
             "line 2, column phi_deg: \"361\"; expected an angle in (-180, 180], \
@@ -212,10 +220,12 @@ fn without_a_column_for_u_it_is_stated_or_left_to_the_fit() {
 #[test]
 fn values_at_listed_rays_stand_beside_the_rays_as_listed() {
     let text = "theta_deg,phi_deg,y_mm,x_mm\n12.3,-45.6,0.1,7\n";
-    let rays = read_rays(text.as_bytes()).unwrap();
+    let rays = read_rays(RayChart::Surface, text.as_bytes()).unwrap();
     let estimate = fit::Estimate { value: 1.5, u: 0.25, u_independent: 0.125 };
     let mut out = Vec::new();
-    write_at(&mut out, Quantity::Radiance, rays.into_iter().map(|ray| (ray, estimate))).unwrap();
+    let rays = rays.into_iter();
+    write_at(&mut out, Quantity::Radiance, RayChart::Surface, rays.map(|ray| (ray, estimate)))
+        .unwrap();
     assert_eq!(
         String::from_utf8(out).unwrap(),
         "x_mm,y_mm,theta_deg,phi_deg,radiance_w_per_m2_sr,u_radiance_w_per_m2_sr,\

@@ -69,7 +69,7 @@ impl Plan {
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
         let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
         let fit = root.table("fit")?.map(read_fit).transpose()?.unwrap_or_default();
-        let derive = Wanted::read_all(&root)?;
+        let derive = Wanted::read_all(&root, false)?;
         root.finish()?;
         Ok(Self {
             name,

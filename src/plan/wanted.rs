@@ -4,8 +4,8 @@
 
 use fit::Ray;
 use fit::derive::{
-    Cells, Cone, EnvironmentMap, HEMISPHERE, Layer, Medium, Receiver, Reference, TwoPlaneGrid,
-    Uncertain, Zone,
+    ALL_DIRECTIONS, Cells, Cone, EnvironmentMap, HEMISPHERE, Layer, Medium, PointReceiver,
+    Receiver, Reference, TwoPlaneGrid, Uncertain, Zone,
 };
 use glam::DVec3;
 use radiometry::direction::wrap;
@@ -49,6 +49,8 @@ pub enum Asked {
     FluxInto(Cone),
     /// At a receiver.
     Irradiance(Receiver),
+    /// At the point of an environment.
+    IrradianceAtPoint(PointReceiver),
     /// From side to side of a plane.
     BeamAngle {
         /// The plane's azimuth, radians.
@@ -73,6 +75,8 @@ enum Kind {
     PeakIntensity,
     Flux,
     Irradiance,
+    CylindricalIrradiance,
+    SphericalIrradiance,
     BeamAngle,
     FieldAngle,
     Environment,
@@ -80,7 +84,7 @@ enum Kind {
 }
 
 /// Photometric names stand beside the radiometric ones; which unit comes out is the detector's.
-const KINDS: [(&str, Kind); 18] = [
+const KINDS: [(&str, Kind); 22] = [
     ("radiance", Kind::Radiance),
     ("luminance", Kind::Radiance),
     ("exitance", Kind::Exitance),
@@ -94,6 +98,10 @@ const KINDS: [(&str, Kind); 18] = [
     ("luminous_flux", Kind::Flux),
     ("irradiance", Kind::Irradiance),
     ("illuminance", Kind::Irradiance),
+    ("cylindrical_irradiance", Kind::CylindricalIrradiance),
+    ("cylindrical_illuminance", Kind::CylindricalIrradiance),
+    ("spherical_irradiance", Kind::SphericalIrradiance),
+    ("spherical_illuminance", Kind::SphericalIrradiance),
     ("beam_angle", Kind::BeamAngle),
     ("field_angle", Kind::FieldAngle),
     ("environment", Kind::Environment),
@@ -104,11 +112,12 @@ const KINDS: [(&str, Kind); 18] = [
 const LENGTH_MM: Bounds = Bounds::between(-1e6, 1e6);
 const SIZE_MM: Bounds = Bounds::positive_up_to(1e6);
 const COMPONENT: Bounds = Bounds::between(-1e6, 1e6);
-const THETA_DEG: Bounds = Bounds::between(0.0, 90.0);
-const THETA_MAX_DEG: Bounds = Bounds::positive_up_to(90.0);
+/// Over the hemisphere, and all round.
+const HEMISPHERE_DEG: f64 = 90.0;
+const SPHERE_DEG: f64 = 180.0;
 const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
 /// A hemisphere's worth.
-const SOLID_ANGLE_SR: Bounds = Bounds::positive_up_to(core::f64::consts::TAU);
+const HEMISPHERE_SR: f64 = core::f64::consts::TAU;
 const LEVEL: Bounds = Bounds::between(1e-3, 0.999);
 const INDEX: Bounds = Bounds::between(1.0, 10.0);
 const ABSORPTION_PER_MM: Bounds = Bounds::between(0.0, 1e3);
@@ -125,8 +134,9 @@ const ROWS: usize = 18;
 const COLUMNS: usize = 72;
 
 impl Wanted {
-    /// Reads every `[[derive]]` of a file's top. A beam angle without a plane is two of them.
-    pub fn read_all(root: &Table<'_>) -> Result<Vec<Self>, Problem> {
+    /// Reads every `[[derive]]` of a file's top, over a hemisphere of directions or `all_round`. A
+    /// beam angle without a plane is two of them.
+    pub fn read_all(root: &Table<'_>, all_round: bool) -> Result<Vec<Self>, Problem> {
         let tables = root.tables("derive")?;
         if tables.len() > WANTED_MAX {
             let what = format!("{} quantities", tables.len());
@@ -135,7 +145,7 @@ impl Wanted {
         }
         let mut all: Vec<Self> = Vec::new();
         for table in tables {
-            let wanted = Self::read(&table)?;
+            let wanted = Self::read(&table, all_round)?;
             let name = wanted.first().and_then(|w| w.name.clone());
             if name.is_some() && all.iter().any(|other| other.name == name) {
                 let what = "is another quantity's name already";
@@ -148,23 +158,32 @@ impl Wanted {
     }
 
     /// Reads one table; whoever calls it finishes the table.
-    pub fn read(table: &Table<'_>) -> Result<Vec<Self>, Problem> {
+    pub fn read(table: &Table<'_>, all_round: bool) -> Result<Vec<Self>, Problem> {
+        let end_deg = if all_round { SPHERE_DEG } else { HEMISPHERE_DEG };
         let kind = table.required_choice("kind", &KINDS)?;
         let name = read_name(table)?;
         let medium = read_medium(table)?;
         let asked = match kind {
-            Kind::Radiance => vec![Asked::Radiance(read_ray(table)?)],
+            Kind::Radiance => vec![Asked::Radiance(read_ray(table, end_deg)?)],
             Kind::Exitance => {
-                vec![Asked::Exitance { at_m: read_place(table)?, zone: read_zone(table)? }]
+                let (at_m, zone) = (read_place(table)?, read_zone(table, HEMISPHERE, end_deg)?);
+                vec![Asked::Exitance { at_m, zone }]
             }
             Kind::Intensity => {
-                let (theta_rad, phi_rad) = read_direction(table)?;
+                let (theta_rad, phi_rad) = read_direction(table, end_deg)?;
                 vec![Asked::Intensity { theta_rad, phi_rad }]
             }
             Kind::CentreIntensity => vec![Asked::Intensity { theta_rad: 0.0, phi_rad: 0.0 }],
             Kind::PeakIntensity => vec![Asked::PeakIntensity],
-            Kind::Flux => vec![read_flux(table)?],
-            Kind::Irradiance => vec![Asked::Irradiance(read_receiver(table)?)],
+            Kind::Flux => vec![read_flux(table, end_deg)?],
+            Kind::Irradiance => vec![read_irradiance(table)?],
+            Kind::CylindricalIrradiance => {
+                let axis = read_axis(table, "axis")?;
+                vec![Asked::IrradianceAtPoint(PointReceiver::Cylinder { axis })]
+            }
+            Kind::SphericalIrradiance => {
+                vec![Asked::IrradianceAtPoint(PointReceiver::Sphere)]
+            }
             Kind::BeamAngle => {
                 let level = table.number("level", LEVEL)?.unwrap_or(BEAM_LEVEL);
                 read_angles(table, level)?
@@ -173,7 +192,10 @@ impl Wanted {
             Kind::Environment => vec![Asked::Environment(read_environment(table)?)],
             Kind::TwoPlane => vec![Asked::TwoPlane(read_two_plane(table)?)],
         };
-        let is_in_air = matches!(asked[0], Asked::Irradiance(_) | Asked::Environment(_));
+        let is_in_air = matches!(
+            asked[0],
+            Asked::Irradiance(_) | Asked::IrradianceAtPoint(_) | Asked::Environment(_)
+        );
         if is_in_air && matches!(medium, Medium::Immersion(_)) {
             return Err(table.problem(
                 "immersion",
@@ -212,33 +234,32 @@ fn read_place(table: &Table<'_>) -> Result<Option<(f64, f64)>, Problem> {
 }
 
 /// θ and φ, or γ and C: γ = θ, C = -φ.
-fn read_direction(table: &Table<'_>) -> Result<(f64, f64), Problem> {
+fn read_direction(table: &Table<'_>, end_deg: f64) -> Result<(f64, f64), Problem> {
     if table.has("gamma_deg") || table.has("c_deg") {
-        let gamma_deg = table.required_number("gamma_deg", THETA_DEG)?;
+        let gamma_deg = table.required_number("gamma_deg", Bounds::between(0.0, end_deg))?;
         let c_deg = table.required_number("c_deg", PHI_DEG)?;
         return Ok((gamma_deg.to_radians(), wrap(-c_deg.to_radians())));
     }
-    let theta_deg = table.required_number("theta_deg", THETA_DEG)?;
+    let theta_deg = table.required_number("theta_deg", Bounds::between(0.0, end_deg))?;
     let phi_deg = table.required_number("phi_deg", PHI_DEG)?;
     table.leave("gamma_deg");
     table.leave("c_deg");
     Ok((theta_deg.to_radians(), wrap(phi_deg.to_radians())))
 }
 
-fn read_ray(table: &Table<'_>) -> Result<Ray, Problem> {
+fn read_ray(table: &Table<'_>, end_deg: f64) -> Result<Ray, Problem> {
     let x_mm = table.required_number("x_mm", LENGTH_MM)?;
     let y_mm = table.required_number("y_mm", LENGTH_MM)?;
-    let (theta_rad, phi_rad) = read_direction(table)?;
+    let (theta_rad, phi_rad) = read_direction(table, end_deg)?;
     Ok(Ray { x_m: x_mm / 1e3, y_m: y_mm / 1e3, theta_rad, phi_rad })
 }
 
-/// `theta_min_deg` and `theta_max_deg`; the whole hemisphere without them.
-fn read_zone(table: &Table<'_>) -> Result<Zone, Problem> {
-    let from_rad = table.number("theta_min_deg", THETA_DEG)?.unwrap_or(0.0).to_radians();
-    let to_rad = table
-        .number("theta_max_deg", THETA_MAX_DEG)?
-        .map_or(HEMISPHERE.to_rad, f64::to_radians)
-        .min(HEMISPHERE.to_rad);
+/// `theta_min_deg` and `theta_max_deg`; all of `whole` without them.
+fn read_zone(table: &Table<'_>, whole: Zone, end_deg: f64) -> Result<Zone, Problem> {
+    let from_deg = table.number("theta_min_deg", Bounds::between(0.0, end_deg))?;
+    let to_deg = table.number("theta_max_deg", Bounds::positive_up_to(end_deg))?;
+    let from_rad = from_deg.unwrap_or(0.0).to_radians();
+    let to_rad = to_deg.map_or(whole.to_rad, f64::to_radians);
     if from_rad < to_rad {
         return Ok(Zone { from_rad, to_rad });
     }
@@ -251,11 +272,17 @@ fn read_zone(table: &Table<'_>) -> Result<Zone, Problem> {
 }
 
 /// A cone by its half angle or its solid angle, about the normal or another axis; else a zone.
-fn read_flux(table: &Table<'_>) -> Result<Asked, Problem> {
-    let half_deg = table.number("half_angle_deg", THETA_MAX_DEG)?;
-    let solid_angle_sr = table.number("solid_angle_sr", SOLID_ANGLE_SR)?;
+fn read_flux(table: &Table<'_>, end_deg: f64) -> Result<Asked, Problem> {
+    let half_deg = table.number("half_angle_deg", Bounds::positive_up_to(end_deg))?;
+    let solid_angle_sr = table.number(
+        "solid_angle_sr",
+        Bounds::positive_up_to(HEMISPHERE_SR * end_deg / HEMISPHERE_DEG),
+    )?;
     let half_angle_rad = match (half_deg, solid_angle_sr) {
-        (None, None) => return Ok(Asked::Flux(read_zone(table)?)),
+        (None, None) => {
+            let whole = if end_deg > HEMISPHERE_DEG { ALL_DIRECTIONS } else { HEMISPHERE };
+            return Ok(Asked::Flux(read_zone(table, whole, end_deg)?));
+        }
         (Some(_), Some(_)) => {
             let what = "the cone has a half angle and a solid angle";
             let help = "remove one: 2π (1 - cos half angle) is the other";
@@ -265,7 +292,8 @@ fn read_flux(table: &Table<'_>) -> Result<Asked, Problem> {
         // 2π (1 - cos α), by its half angle.
         (None, Some(sr)) => 2.0 * libm::asin((sr / (2.0 * core::f64::consts::TAU)).sqrt()),
     };
-    let axis_theta_deg = table.number("axis_theta_deg", THETA_DEG)?.unwrap_or(0.0);
+    let axis_theta_deg =
+        table.number("axis_theta_deg", Bounds::between(0.0, end_deg))?.unwrap_or(0.0);
     let axis_phi_deg = table.number("axis_phi_deg", PHI_DEG)?.unwrap_or(0.0);
     let axis_theta_rad = axis_theta_deg.to_radians();
     let axis_phi_rad = wrap(axis_phi_deg.to_radians());
@@ -276,6 +304,27 @@ fn required_vector(table: &Table<'_>, key: &str, bounds: Bounds) -> Result<DVec3
     let found = table.numbers(key, bounds, 3..=3)?;
     let found = found.ok_or_else(|| table.missing(key, "a list of three numbers"))?;
     Ok(DVec3::new(found[0], found[1], found[2]))
+}
+
+/// A vector that is a direction.
+fn read_axis(table: &Table<'_>, key: &str) -> Result<DVec3, Problem> {
+    let axis = required_vector(table, key, COMPONENT)?;
+    if axis == DVec3::ZERO {
+        let help = "[0, 0, 1] points along +z";
+        return Err(table.problem(key, "has no direction", "three numbers, not all 0", help));
+    }
+    Ok(axis)
+}
+
+/// A receiver somewhere; without a place, at the point of an environment.
+fn read_irradiance(table: &Table<'_>) -> Result<Asked, Problem> {
+    if table.has("vertices_mm") || table.has("at_mm") || !table.has("normal") {
+        return Ok(Asked::Irradiance(read_receiver(table)?));
+    }
+    table.leave("vertices_mm");
+    table.leave("at_mm");
+    let normal = read_axis(table, "normal")?;
+    Ok(Asked::IrradianceAtPoint(PointReceiver::Face { normal }))
 }
 
 /// `vertices_mm`, a polygon; or `at_mm` and `normal`, a point; with `radius_mm` a disk.
@@ -313,9 +362,17 @@ fn read_angles(table: &Table<'_>, level: f64) -> Result<Vec<Asked>, Problem> {
 }
 
 fn read_environment(table: &Table<'_>) -> Result<EnvironmentMap, Problem> {
-    let at_m = required_vector(table, "at_mm", LENGTH_MM)? / 1e3;
-    let normal = required_vector(table, "normal", COMPONENT)?;
-    Receiver::point(at_m, normal).map_err(|error| {
+    let normal = read_axis(table, "normal")?;
+    let at_m = if table.has("at_mm") {
+        required_vector(table, "at_mm", LENGTH_MM)? / 1e3
+    } else {
+        // An environment that was measured itself has one point.
+        table.leave("at_mm");
+        DVec3::ZERO
+    };
+    let is_elsewhere = at_m != DVec3::ZERO;
+    let place = if is_elsewhere { at_m } else { DVec3::Z };
+    Receiver::point(place, normal).map_err(|error| {
         let expected = "a point above the sample's plane z = 0, with a normal";
         table.problem(
             "at_mm",

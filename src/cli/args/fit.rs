@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::chart::ChartArgs;
+
 #[derive(Debug, Args)]
 pub(crate) struct FitArgs {
     /// A run's folder, or a CSV with x_mm, y_mm, theta_deg, phi_deg and a radiance. With --merge
@@ -20,18 +22,10 @@ pub(crate) struct FitArgs {
     #[arg(long, conflicts_with_all = ["basis", "angular_degree", "position_degree",
         "penalty_power", "penalty_strength", "rig"])]
     pub(crate) merge: bool,
-    /// With --partial of a CSV: from where to where all shares lie, the same for each.
-    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
-        allow_hyphen_values = true)]
-    pub(crate) x_mm: Option<(f64, f64)>,
-    /// As --x-mm.
-    #[arg(long, value_name = "A,B", requires = "partial", value_parser = interval,
-        allow_hyphen_values = true)]
-    pub(crate) y_mm: Option<(f64, f64)>,
-    /// With --partial of a CSV: the cone's half angle that all shares stand for.
-    #[arg(long, value_name = "DEG", requires = "partial")]
-    pub(crate) theta_max_deg: Option<f64>,
-    /// Functions of the direction: zernike, hemispherical, even-harmonics or splines. Default: what
+    #[command(flatten)]
+    pub(crate) chart: ChartArgs,
+    /// Functions of the direction: zernike, hemispherical, even-harmonics or splines; in the
+    /// perpendicular and the environment chart spherical, between two planes legendre. Default: what
     /// the plan pins, or else the one that predicts left-out sweeps best.
     #[arg(long, value_name = "NAME")]
     pub(crate) basis: Option<String>,
@@ -49,7 +43,7 @@ pub(crate) struct FitArgs {
     /// Highest total degree of the polynomials over position.
     #[arg(long, value_name = "N")]
     pub(crate) position_degree: Option<usize>,
-    /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg).
+    /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg, or the chart's).
     #[arg(long, value_name = "FILE")]
     pub(crate) at: Option<PathBuf>,
     /// Derive a quantity with its uncertainty: "KIND KEY=VALUE ..." or a .toml file of [[derive]]
@@ -72,15 +66,4 @@ pub(crate) struct FitArgs {
     /// Print fit.json.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// Two numbers, a comma between.
-fn interval(text: &str) -> Result<(f64, f64), String> {
-    let numbers = || {
-        let (from, to) = text.split_once(',')?;
-        Some((from.trim().parse::<f64>().ok()?, to.trim().parse::<f64>().ok()?))
-    };
-    numbers()
-        .filter(|(from, to)| from.is_finite() && to.is_finite() && from <= to)
-        .ok_or_else(|| "expected from and to in mm with a comma between, -20,20 say".to_owned())
 }

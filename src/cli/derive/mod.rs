@@ -7,8 +7,8 @@ mod words;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use fit::Fit;
-use fit::derive::{DeriveError, Derived, Field};
+use fit::derive::{DeriveError, Derived, Field, PointReceiver};
+use fit::{Chart, Fit};
 
 use self::words::{angle_name, in_words};
 use super::text::{percent, row, with_uncertainty};
@@ -37,8 +37,13 @@ pub(crate) fn derive(fit: &Fit, quantity: Quantity, wanted: &[Wanted]) -> Vec<De
 
 fn derived(fit: &Fit, quantity: Quantity, wanted: &Wanted) -> Vec<DerivedQuantity> {
     let base = |kind: DerivedKind| {
-        let peak = if wanted.asked == Asked::PeakIntensity { "peak_" } else { "" };
-        wanted.name.clone().unwrap_or_else(|| format!("{peak}{}", kind.quantity(quantity)))
+        let before = match wanted.asked {
+            Asked::PeakIntensity => "peak_",
+            Asked::IrradianceAtPoint(PointReceiver::Cylinder { .. }) => "cylindrical_",
+            Asked::IrradianceAtPoint(PointReceiver::Sphere) => "spherical_",
+            _ => "",
+        };
+        wanted.name.clone().unwrap_or_else(|| format!("{before}{}", kind.quantity(quantity)))
     };
     let one = |kind: DerivedKind, outcome: Result<DerivedOutcome, DeriveError>| {
         let name = match (&wanted.asked, &wanted.name) {
@@ -48,7 +53,14 @@ fn derived(fit: &Fit, quantity: Quantity, wanted: &Wanted) -> Vec<DerivedQuantit
             _ => base(kind),
         };
         let outcome = outcome.map_err(|error| error.to_string());
-        DerivedQuantity { name, kind, asked: in_words(wanted), outcome }
+        let asked = match (&wanted.asked, fit.region().chart) {
+            (Asked::Flux(_), Chart::TwoPlane { .. }) => "through both rectangles".to_owned(),
+            (Asked::Environment(map), Chart::Environment) => {
+                format!("resampled all round, {} x {} cells", map.rows, map.columns)
+            }
+            _ => in_words(wanted),
+        };
+        DerivedQuantity { name, kind, asked, outcome }
     };
     let number = |derived: Derived| DerivedOutcome::Number {
         derived: Box::new(derived),
@@ -74,6 +86,7 @@ fn derived(fit: &Fit, quantity: Quantity, wanted: &Wanted) -> Vec<DerivedQuantit
         Asked::BeamAngle { phi_rad, level, reference } => {
             field.beam_angle(*phi_rad, *level, *reference).map(|angle| number(angle.in_degrees()))
         }
+        Asked::IrradianceAtPoint(receiver) => field.irradiance_at_point(receiver).map(number),
         Asked::Environment(map) => field
             .environment(map)
             .map(|cells| DerivedOutcome::Table(tables::cells(quantity, &cells))),
@@ -102,7 +115,7 @@ fn kind_of(asked: &Asked) -> DerivedKind {
         Asked::Exitance { .. } => DerivedKind::Exitance,
         Asked::Intensity { .. } | Asked::PeakIntensity => DerivedKind::Intensity,
         Asked::Flux(_) | Asked::FluxInto(_) => DerivedKind::Flux,
-        Asked::Irradiance(_) => DerivedKind::Irradiance,
+        Asked::Irradiance(_) | Asked::IrradianceAtPoint(_) => DerivedKind::Irradiance,
         Asked::BeamAngle { .. } => DerivedKind::Angle,
         Asked::Environment(_) => DerivedKind::Environment,
         Asked::TwoPlane(_) => DerivedKind::TwoPlane,

@@ -9,27 +9,27 @@ use spanned_toml::{Document, Source};
 use crate::cli::failure::Failure;
 use crate::plan::Wanted;
 
-/// Reads every SPEC: a file if its name ends in .toml, else `KIND KEY=VALUE ...`.
-pub(crate) fn wanted(specs: &[String]) -> Result<Vec<Wanted>, Failure> {
+/// Reads every SPEC, over a hemisphere of directions or all round: a file if its name ends in .toml, else `KIND KEY=VALUE ...`.
+pub(crate) fn wanted(specs: &[String], all_round: bool) -> Result<Vec<Wanted>, Failure> {
     let mut all = Vec::new();
     for spec in specs {
         let path = Path::new(spec);
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-            all.extend(from_file(path)?);
+            all.extend(from_file(path, all_round)?);
         } else {
             let document = Document::parse(Source::new("--derive", &toml_of(spec)?))?;
             let root = document.root();
-            all.extend(Wanted::read(&root)?);
+            all.extend(Wanted::read(&root, all_round)?);
             root.finish()?;
         }
     }
     Ok(all)
 }
 
-fn from_file(path: &Path) -> Result<Vec<Wanted>, Failure> {
+fn from_file(path: &Path, all_round: bool) -> Result<Vec<Wanted>, Failure> {
     let document = Document::parse(Source::read(path)?)?;
     let root = document.root();
-    let wanted = Wanted::read_all(&root)?;
+    let wanted = Wanted::read_all(&root, all_round)?;
     root.finish()?;
     if wanted.is_empty() {
         let what = format!("{}: asks for nothing; expected [[derive]] tables", path.display());
@@ -111,7 +111,9 @@ mod tests {
             toml_of("flux window={index = 1.5, thickness_mm = 4} theta_max_deg=6e1").unwrap();
         assert!(text.contains("window = {index = 1.5, thickness_mm = 4}\ntheta_max_deg = 6e1"));
         assert_eq!(
-            wanted(&["flux window.index=1.5 window.thickness_mm=4".to_owned()]).unwrap().len(),
+            wanted(&["flux window.index=1.5 window.thickness_mm=4".to_owned()], false)
+                .unwrap()
+                .len(),
             1
         );
         assert!(toml_of("  ").is_err() && toml_of("flux theta").is_err());

@@ -1,6 +1,6 @@
 //! What was asked for, in words, and the names of angles by their planes.
 
-use fit::derive::{Medium, Reference, Zone};
+use fit::derive::{ALL_DIRECTIONS, Medium, PointReceiver, Reference, Zone};
 use glam::DVec3;
 
 use crate::plan::{Asked, Wanted};
@@ -32,6 +32,9 @@ pub(super) fn in_words(wanted: &Wanted) -> String {
     let mm = |m: f64| (m * 1e12).round() / 1e9;
     let place = |p: DVec3| format!("({}, {}, {}) mm", mm(p.x), mm(p.y), mm(p.z));
     let zone = |zone: &Zone| {
+        if *zone == ALL_DIRECTIONS {
+            return "in all directions".to_owned();
+        }
         format!("within {}° to {}° of the normal", deg(zone.from_rad), deg(zone.to_rad))
     };
     let text = match &wanted.asked {
@@ -63,6 +66,21 @@ pub(super) fn in_words(wanted: &Wanted) -> String {
             let shape = if size > 0.0 { format!("{size:.6} mm² about ") } else { String::new() };
             let [x, y, z] = [n.x, n.y, n.z].map(|c| (c * 1e6).round() / 1e6);
             format!("at {shape}{} facing ({x}, {y}, {z})", place(receiver.place_m()))
+        }
+        Asked::IrradianceAtPoint(receiver) => {
+            let components = |v: DVec3| {
+                let [x, y, z] = [v.x, v.y, v.z].map(|c| (c * 1e6).round() / 1e6);
+                format!("({x}, {y}, {z})")
+            };
+            match receiver {
+                PointReceiver::Face { normal } => {
+                    format!("at the point, facing {}", components(*normal))
+                }
+                PointReceiver::Cylinder { axis } => {
+                    format!("at the point, of a cylinder about {}", components(*axis))
+                }
+                PointReceiver::Sphere => "at the point, from all sides".to_owned(),
+            }
         }
         Asked::BeamAngle { phi_rad, level, reference } => {
             let of = match reference {
