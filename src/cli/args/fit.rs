@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::chart::ChartArgs;
+use super::ChartArgs;
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArgs {

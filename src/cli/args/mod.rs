@@ -6,6 +6,7 @@
 // Flags of a command are flags.
 #![allow(clippy::struct_excessive_bools)]
 
+mod chart;
 mod fit;
 mod study;
 
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use chart::ChartArgs;
 pub(crate) use fit::FitArgs;
 pub(crate) use study::{CoverageArgs, FrontierArgs, Study};
 
