@@ -94,7 +94,7 @@ impl ChartArgs {
     pub(super) fn region(
         &self,
         chart: RayChart,
-        rays: impl Iterator<Item = Ray> + Clone,
+        rays: &(impl Iterator<Item = Ray> + Clone),
     ) -> Region {
         let extent = |of: &dyn Fn(&Ray) -> f64| {
             let ends = (f64::INFINITY, f64::NEG_INFINITY);
@@ -131,7 +131,7 @@ impl ChartArgs {
             RayChart::Environment => has_cone,
             RayChart::TwoPlane { .. } => has_place && self.s_mm.is_some() && self.t_mm.is_some(),
         };
-        is_whole.then(|| self.region(chart, std::iter::empty()))
+        is_whole.then(|| self.region(chart, &std::iter::empty()))
     }
 
     /// Refuses rays that are listed in another chart than the fit's.

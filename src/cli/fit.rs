@@ -147,7 +147,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     {
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
-    let region = args.chart.region(chart, input.samples.iter().map(|sample| sample.ray.ray()));
+    let region = args.chart.region(chart, &input.samples.iter().map(|sample| sample.ray.ray()));
     let wish = wished(args, Wish::default())?;
     let samples = input.fit_samples(args.u_relative);
     let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);

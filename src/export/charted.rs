@@ -13,16 +13,11 @@ pub(super) fn region_json(region: &Region) -> Value {
     let mm = |(from, to): (f64, f64)| [from * 1e3, to * 1e3];
     let theta_max_deg = region.theta_max_rad.to_degrees();
     match region.chart {
-        Chart::Surface => json!({
-            "x_mm": mm(region.x_m),
-            "y_mm": mm(region.y_m),
-            "theta_max_deg": theta_max_deg,
-        }),
         Chart::Perpendicular { face: Face::Disk } => json!({
             "radius_mm": (region.x_m.1 - region.x_m.0) * 0.5e3,
             "theta_max_deg": theta_max_deg,
         }),
-        Chart::Perpendicular { face: Face::Rectangle } => json!({
+        Chart::Surface | Chart::Perpendicular { face: Face::Rectangle } => json!({
             "x_mm": mm(region.x_m),
             "y_mm": mm(region.y_m),
             "theta_max_deg": theta_max_deg,
