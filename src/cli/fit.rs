@@ -13,6 +13,7 @@ use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
 use super::output::{note, say, write_out};
 use super::partial;
+use super::picture;
 use super::results::{Results, read_run};
 use super::setup::rig_at;
 use super::summary::{field_rows, model_rows};
@@ -31,6 +32,9 @@ const CSV_BYTES_MAX: u64 = 2 << 30;
 /// Fits again and prints what came out.
 pub(crate) fn fit(args: &FitArgs) -> Outcome {
     let chart = args.chart.ray_chart()?;
+    if args.picture.is_some() {
+        picture::check(&args.chart.chart)?;
+    }
     let rays = args.at.as_deref().map(|path| rays_at(chart, path)).transpose()?;
     let wanted = derive::wanted(&args.derive, chart.is_all_round())?;
     if args.merge {
@@ -175,6 +179,9 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     };
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+    }
+    if let Some(path) = &args.picture {
+        picture::write(path, &fit, input.quantity, &samples)?;
     }
     show(args, rays, &file, args.output.as_deref())
 }

@@ -20,6 +20,7 @@ mod nominal;
 mod outlook;
 mod output;
 mod partial;
+mod picture;
 mod plan;
 mod ports;
 mod progress;

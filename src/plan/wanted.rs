@@ -176,7 +176,7 @@ impl Wanted {
             Kind::CentreIntensity => vec![Asked::Intensity { theta_rad: 0.0, phi_rad: 0.0 }],
             Kind::PeakIntensity => vec![Asked::PeakIntensity],
             Kind::Flux => vec![read_flux(table, end_deg)?],
-            Kind::Irradiance => vec![read_irradiance(table)?],
+            Kind::Irradiance => vec![read_irradiance(table, all_round)?],
             Kind::CylindricalIrradiance => {
                 let axis = read_axis(table, "axis")?;
                 vec![Asked::IrradianceAtPoint(PointReceiver::Cylinder { axis })]
@@ -189,7 +189,7 @@ impl Wanted {
                 read_angles(table, level)?
             }
             Kind::FieldAngle => read_angles(table, FIELD_LEVEL)?,
-            Kind::Environment => vec![Asked::Environment(read_environment(table)?)],
+            Kind::Environment => vec![Asked::Environment(read_environment(table, all_round)?)],
             Kind::TwoPlane => vec![Asked::TwoPlane(read_two_plane(table)?)],
         };
         let is_in_air = matches!(
@@ -316,9 +316,9 @@ fn read_axis(table: &Table<'_>, key: &str) -> Result<DVec3, Problem> {
     Ok(axis)
 }
 
-/// A receiver somewhere; without a place, at the point of an environment.
-fn read_irradiance(table: &Table<'_>) -> Result<Asked, Problem> {
-    if table.has("vertices_mm") || table.has("at_mm") || !table.has("normal") {
+/// A receiver somewhere; where directions go all round, without a place, at the point itself.
+fn read_irradiance(table: &Table<'_>, all_round: bool) -> Result<Asked, Problem> {
+    if !all_round || table.has("vertices_mm") || table.has("at_mm") {
         return Ok(Asked::Irradiance(read_receiver(table)?));
     }
     table.leave("vertices_mm");
@@ -361,17 +361,16 @@ fn read_angles(table: &Table<'_>, level: f64) -> Result<Vec<Asked>, Problem> {
     Ok(planes_deg.into_iter().map(angle).collect())
 }
 
-fn read_environment(table: &Table<'_>) -> Result<EnvironmentMap, Problem> {
-    let normal = read_axis(table, "normal")?;
-    let at_m = if table.has("at_mm") {
+fn read_environment(table: &Table<'_>, all_round: bool) -> Result<EnvironmentMap, Problem> {
+    let normal = required_vector(table, "normal", COMPONENT)?;
+    let at_m = if table.has("at_mm") || !all_round {
         required_vector(table, "at_mm", LENGTH_MM)? / 1e3
     } else {
         // An environment that was measured itself has one point.
         table.leave("at_mm");
         DVec3::ZERO
     };
-    let is_elsewhere = at_m != DVec3::ZERO;
-    let place = if is_elsewhere { at_m } else { DVec3::Z };
+    let place = if table.has("at_mm") { at_m } else { DVec3::Z };
     Receiver::point(place, normal).map_err(|error| {
         let expected = "a point above the sample's plane z = 0, with a normal";
         table.problem(

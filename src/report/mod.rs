@@ -12,6 +12,7 @@ mod plane;
 mod polar;
 mod raster;
 mod scores;
+mod sphere;
 mod svg;
 mod ticks;
 
@@ -23,5 +24,6 @@ pub use page::{Report, Section, Table};
 pub use plane::Plane;
 pub use polar::Polar;
 pub use scores::{Cells, scores_svg};
+pub use sphere::Sphere;
 pub use svg::Picture;
 pub use ticks::significant;

@@ -63,6 +63,9 @@ pub(crate) struct FitArgs {
     /// Where to write fit.json. Default: the run's folder; of a CSV it is not written.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// With --chart perpendicular or environment: draw the field in all directions, as an SVG file.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["partial", "merge"])]
+    pub(crate) picture: Option<PathBuf>,
     /// Print fit.json.
     #[arg(long)]
     pub(crate) json: bool,
