@@ -116,6 +116,19 @@ fn an_environment_has_irradiances_at_its_point_and_a_map() {
 }
 
 #[test]
+fn a_whole_sphere_is_drawn_and_other_charts_are_not() {
+    let bench = bench();
+    let draw = ["--picture", "all-round.svg"];
+    bench.gonio(&[&["fit", "object.csv"], &SIDES[..], &ALL_ROUND, &draw].concat()).well();
+    let svg = std::fs::read_to_string(bench.path("all-round.svg")).unwrap();
+    assert!(svg.starts_with("<?xml") && svg.contains(">intensity I<") && svg.contains(">W/sr<"));
+    assert_eq!(svg.matches("class=\"curve\"").count(), 2);
+    let refused = bench.gonio(&[&["fit", "planes.csv"], &PLANES[..], &draw].concat());
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.err.contains("--picture: there is none of the two-plane chart"));
+}
+
+#[test]
 fn two_planes_have_the_flux_between_them_and_values_at_listed_rays() {
     let bench = bench();
     let region = ["--u-mm=-10,10", "--v-mm=-8,8", "--s-mm=-10,10", "--t-mm=-8,8"];

@@ -154,9 +154,8 @@ impl Sphere<'_> {
             svg.path(&attributes, &format!("M{} {}h22", px(x), px(y - 4.0)));
             svg.label("", Anchor::Start, (x + 27.0, y), name);
         }
-        svg.label("soft", Anchor::End, (centre.0 + RADIUS + 60.0, centre.1 + RADIUS + 36.0), {
-            &ticks.unit(self.unit)
-        });
+        let place = (centre.0 + RADIUS + 60.0, centre.1 + RADIUS + 36.0);
+        svg.label("soft", Anchor::End, place, &ticks.unit(self.unit));
     }
 
     /// All round a plane: the signed angle, value and u; `None` where nothing was measured.
