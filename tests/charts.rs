@@ -77,6 +77,14 @@ fn an_object_has_intensity_and_flux_and_no_exitance() {
     assert_near(&json, "/peak_intensity_w_per_sr/value", 100.0 * (1.0 + size) * area, 1e-3);
     assert_near(&json, "/peak_intensity_w_per_sr/theta_deg", 0.6_f64.atan().to_degrees(), 2e-2);
     assert_eq!(json["uncertainty_budget_flux_w"][0]["name"], "independent");
+    // What all samples share stays apart, and does not average away.
+    let scale = ["--u-scale", "0.02"];
+    let shared = fitted(&bench, &[&["object.csv"], &SIDES[..], &ALL_ROUND, &scale].concat());
+    let flux = number(&shared, "/flux_w/value");
+    let independent = number(&shared, "/flux_w/u_independent");
+    assert_near(&shared, "/flux_w/u", (0.02 * flux).hypot(independent), 1e-9);
+    assert!((independent / number(&json, "/flux_w/u") - 1.0).abs() < 1e-6);
+    assert_eq!(shared["uncertainty_budget_flux_w"][1]["name"], "scale");
     let keys = json.as_object().unwrap().keys();
     assert_eq!(keys.filter(|key| key.contains("exitance")).count(), 0);
     // What it has not is refused by name; the rest is there.

@@ -101,6 +101,12 @@ fn kind_named(name: &str) -> Result<AngularKind, Failure> {
 
 fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
     args.chart.demand_none()?;
+    if args.u_scale.is_some() {
+        return Err(Failure::with_help(
+            "--u-scale: a run's rig says how well its scale is known",
+            "leave it out; it is for a CSV",
+        ));
+    }
     if args.u_relative.is_some() {
         return Err(Failure::with_help(
             "--u-relative: a run's samples have uncertainties of their own",
@@ -151,6 +157,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     {
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
+    let common = scale_of(args)?;
     let region = args.chart.region(chart, &input.samples.iter().map(|sample| sample.ray.ray()));
     let wish = wished(args, Wish::default())?;
     let samples = input.fit_samples(args.u_relative);
@@ -158,9 +165,10 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
     let (model, choice) =
         fit::choose(&samples, &region, &wish, optics.as_ref()).map_err(refused)?;
-    let fit = fit::fit_seen(&samples, &region, model, &[], optics.as_ref()).map_err(refused)?;
+    let fit = fit::fit_seen(&samples, &region, model, &common, optics.as_ref()).map_err(refused)?;
     let resolves = Resolves::of(&samples, &region, model.basis, optics.as_ref());
-    let notes = [note_on_u(&input, args.u_relative)];
+    let mut notes = vec![note_on_u(&input, args.u_relative)];
+    notes.extend(args.u_scale.map(|u| format!("all samples share a scale known to {u}, relative")));
     let derived = derive::derive(&fit, input.quantity, wanted);
     let folder = args.output.as_deref().map_or(Path::new(""), beside);
     derive::write_tables(folder, &derived).map_err(Failure::midway)?;
@@ -184,6 +192,15 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         picture::write(path, &fit, input.quantity, &samples)?;
     }
     show(args, rays, &file, args.output.as_deref())
+}
+
+/// What all samples of a CSV share.
+fn scale_of(args: &FitArgs) -> Result<Vec<fit::Common>, Failure> {
+    let Some(u) = args.u_scale else { return Ok(Vec::new()) };
+    if !(u >= 0.0 && u.is_finite()) {
+        return Err(Failure::start(format!("--u-scale: {u}; expected a number of 0 or more")));
+    }
+    Ok(vec![fit::Common { name: "scale".to_owned(), u, shift: fit::Shift::Scale }])
 }
 
 fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {

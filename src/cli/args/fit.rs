@@ -56,6 +56,11 @@ pub(crate) struct FitArgs {
     /// partial fits --merge takes it.
     #[arg(long, value_name = "U")]
     pub(crate) u_relative: Option<f64>,
+    /// For a CSV: the relative standard uncertainty of the scale that all its samples share, a
+    /// responsivity say. It does not average away, and is kept apart from what is independent.
+    #[arg(long, value_name = "U", conflicts_with_all = ["partial", "merge"],
+        allow_negative_numbers = true)]
+    pub(crate) u_scale: Option<f64>,
     /// For a CSV: the rig whose detector read it (a file, or "simulated"), for its beam's width.
     /// Default: a sample is the radiance along its ray.
     #[arg(long, value_name = "RIG")]
