@@ -243,7 +243,7 @@ fn a_plan_of_sweeps_is_flown_in_the_time_that_was_predicted() {
     assert!(bench.text("again/samples.csv") == bench.text("out/samples.csv"));
 
     let fast = "speed_deg_per_s = 61";
-    let bench = bench.with("sweep.toml", "narrowest_deg = 40", fast);
+    let bench = bench.with("sweep.toml", "narrowest_feature_deg = 40", fast);
     let said = bench.gonio(&["plan", "sweep.toml"]);
     assert_eq!(said.code, Some(2), "{said}");
     let _ = said.says(&["speed_deg_per_s", "at most 60.000°/s"]);

@@ -60,14 +60,15 @@ impl Plan {
         let (name, rig, scene) = (read_name(&root)?, text("rig")?, text("scene")?);
         let region = read_region(root.required_table("region")?)?;
         let sample = root.table("sample")?.map(|table| read_sample(table, &region)).transpose()?;
-        let (schedule, order, repeat, window) = read_schedule(root.required_table("schedule")?)?;
+        let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
+        let (schedule, order, repeat, window) =
+            read_schedule(root.required_table("schedule")?, &expect)?;
         let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
         let dwell = window.unwrap_or(dwell);
         let dark = read_dark(root.required_table("dark")?, dwell)?;
         let reference = read_reference(root.table("reference")?, &region, dwell)?;
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
-        let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
         let fit = root.table("fit")?.map(read_fit).transpose()?.unwrap_or_default();
         let derive = Wanted::read_all(&root, false)?;
         root.finish()?;
@@ -178,11 +179,14 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// raster: `x_count`, `y_count`, `theta_step_deg`, `phi_step_deg` ·
 /// cgamma: `x_count`, `y_count`, `c_step_deg`, `gamma_step_deg` ·
 /// low-discrepancy: `count` · list: `file` ·
-/// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_deg`, the full width at half maximum of
-/// the narrowest feature that is looked for, or `speed_deg_per_s`; `window_ms` (default:
-/// `dwell.dwell_ms`). Sweeps have their own order.
+/// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_feature_deg`, the full width at half
+/// maximum of the narrowest feature that is looked for (default: `[expect]`'s), or
+/// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`). Sweeps have their own order.
 /// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
-fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32, Option<Duration>), Problem> {
+fn read_schedule(
+    table: Table<'_>,
+    expect: &Expect,
+) -> Result<(Schedule, Order, u32, Option<Duration>), Problem> {
     #[derive(Clone, Copy)]
     enum Kind {
         CGamma,
@@ -215,7 +219,7 @@ fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32, Option<Durat
         },
         Kind::LowDiscrepancy => Schedule::LowDiscrepancy { count: count("count")? },
         Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
-        Kind::Sweep => read_sweep(&table)?,
+        Kind::Sweep => read_sweep(&table, expect)?,
     };
     if let Schedule::Sweep { .. } = schedule {
         let window = table.number("window_ms", DWELL_MS)?.map(millis);
@@ -230,21 +234,25 @@ fn read_schedule(table: Table<'_>) -> Result<(Schedule, Order, u32, Option<Durat
     Ok((schedule, order, repeat, None))
 }
 
-fn read_sweep(table: &Table<'_>) -> Result<Schedule, Problem> {
+fn read_sweep(table: &Table<'_>, expect: &Expect) -> Result<Schedule, Problem> {
+    let speed_deg_per_s = table.number("speed_deg_per_s", SPEED_DEG_PER_S)?;
+    let expected_deg = expect.narrowest_feature_rad.map(f64::to_degrees);
+    // Who states a speed has it.
+    let expected_deg = expected_deg.filter(|_| speed_deg_per_s.is_none());
     let schedule = Schedule::Sweep {
         x_count: read_count(table, "x_count", COUNT_MAX)?,
         y_count: read_count(table, "y_count", COUNT_MAX)?,
         phi_step_deg: read_turn_step(table, "phi_step_deg")?,
-        speed_deg_per_s: table.number("speed_deg_per_s", SPEED_DEG_PER_S)?,
-        narrowest_deg: table.number("narrowest_deg", STEP_DEG)?,
+        speed_deg_per_s,
+        narrowest_feature_deg: table.number("narrowest_feature_deg", STEP_DEG)?.or(expected_deg),
     };
-    if let Schedule::Sweep { speed_deg_per_s: None, narrowest_deg: None, .. } = schedule {
+    if let Schedule::Sweep { speed_deg_per_s: None, narrowest_feature_deg: None, .. } = schedule {
         return Err(table.problem(
-            "narrowest_deg",
+            "narrowest_feature_deg",
             "nothing says how fast to sweep",
-            "narrowest_deg, the full width at half maximum of the narrowest feature that is looked \
+            "narrowest_feature_deg, the full width at half maximum of the narrowest feature that is looked \
              for, or speed_deg_per_s",
-            "state narrowest_deg: the speed follows from it, and from the beam",
+            "state narrowest_feature_deg, here or in [expect]: the speed follows from it and the beam",
         ));
     }
     Ok(schedule)

@@ -271,7 +271,7 @@ fn pinned_travel(plan: &Plan, rig: &Rig, speed_deg_per_s: f64) -> Result<i32, Pr
                 axis.name.name()
             ),
             &format!("at most {most_deg_per_s:.3}°/s"),
-            "sweep more slowly, or leave the key out and state narrowest_deg",
+            "sweep more slowly, or leave the key out and state narrowest_feature_deg",
         ));
     }
     let travel = whole(axis, speed_deg_per_s.to_radians() * window_s(rig, plan.dwell));
@@ -289,11 +289,12 @@ fn pinned_travel(plan: &Plan, rig: &Rig, speed_deg_per_s: f64) -> Result<i32, Pr
 
 /// As far as the narrowest feature bears, or the axis can.
 fn free_travel(plan: &Plan, rig: &Rig) -> i32 {
-    let Schedule::Sweep { narrowest_deg, .. } = plan.schedule else { return 1 };
+    let Schedule::Sweep { narrowest_feature_deg, .. } = plan.schedule else { return 1 };
     let detector = &rig.detector;
     let sigma =
         libm::hypot(detector.pupil_radius_m, detector.spot_radius_m) / (2.0 * detector.distance_m);
-    let seen = libm::hypot(narrowest_deg.unwrap_or_default().to_radians(), FWHM_PER_SIGMA * sigma);
+    let seen =
+        libm::hypot(narrowest_feature_deg.unwrap_or_default().to_radians(), FWHM_PER_SIGMA * sigma);
     let axis = &rig.axes[0];
     let fastest = axis.position(f64::from(axis.counts_per_s())) * window_s(rig, plan.dwell);
     whole(axis, (PART_OF_NARROWEST * seen).min(fastest)).max(1)

@@ -115,7 +115,7 @@ fn the_prediction_is_windows_ramps_leads_and_turns() {
 fn the_narrowest_feature_sets_the_speed_and_the_axis_bounds_it() {
     let rig = Rig::built_in().unwrap();
     let speed = |narrowest: f64| {
-        let text = with("speed_deg_per_s = 20", &format!("narrowest_deg = {narrowest}"));
+        let text = with("speed_deg_per_s = 20", &format!("narrowest_feature_deg = {narrowest}"));
         plan(&text).lay_out(&rig, None).unwrap().speeds(&rig)[0].to_degrees()
     };
     let detector = &rig.detector;
@@ -170,7 +170,7 @@ fn what_a_rig_or_its_wire_can_t_do_is_said_with_what_to_do() {
     assert!(far.contains("run-up") && far.contains("95.000°"), "{far}");
     // Where the speed is free, it is lowered until the run-up fits.
     let free = with("theta_max_deg = 80", "theta_max_deg = 90");
-    let free = plan(&free.replace("speed_deg_per_s = 20", "narrowest_deg = 60"));
+    let free = plan(&free.replace("speed_deg_per_s = 20", "narrowest_feature_deg = 60"));
     let speed = free.lay_out(&rig, None).unwrap().speeds(&rig)[0].to_degrees();
     assert!(speed > 25.0 && speed < 35.0, "{speed}");
     let read = |text: &str| {
@@ -178,8 +178,15 @@ fn what_a_rig_or_its_wire_can_t_do_is_said_with_what_to_do() {
             .unwrap_err()
             .to_string()
     };
+    // What the plan expects of the field says how fast to sweep, too.
+    let own = plan(&with("speed_deg_per_s = 20", "narrowest_feature_deg = 30"));
+    let expect = "\n[expect]\nnarrowest_feature_deg = 30\n";
+    let expected = plan(&format!("{}{expect}", with("speed_deg_per_s = 20\n", "")));
+    let [own, expected] =
+        [own, expected].map(|plan| plan.lay_out(&rig, None).unwrap().speeds(&rig)[0]);
+    assert!(own > 0.0 && (own / expected - 1.0).abs() < 1e-9, "{own} {expected}");
     let nothing = read(&with("speed_deg_per_s = 20\n", ""));
-    assert!(nothing.contains("narrowest_deg"), "{nothing}");
+    assert!(nothing.contains("narrowest_feature_deg"), "{nothing}");
     let zero = read(&with("speed_deg_per_s = 20", "speed_deg_per_s = 0"));
     assert!(zero.contains("above 0"), "{zero}");
 }

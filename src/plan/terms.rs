@@ -107,7 +107,7 @@ pub enum Schedule {
         /// The arm's speed, degrees a second; as fast as the narrowest feature bears if absent.
         speed_deg_per_s: Option<f64>,
         /// Full width at half maximum of the narrowest feature that is looked for, degrees.
-        narrowest_deg: Option<f64>,
+        narrowest_feature_deg: Option<f64>,
     },
 }
 

@@ -92,15 +92,20 @@ impl Rung {
             Schedule::LowDiscrepancy { count } => {
                 Schedule::LowDiscrepancy { count: scaled_count(count, self.density) }
             }
-            Schedule::Sweep { x_count, y_count, phi_step_deg, speed_deg_per_s, narrowest_deg } => {
-                Schedule::Sweep {
-                    x_count,
-                    y_count,
-                    phi_step_deg: finer_pairs(phi_step_deg),
-                    speed_deg_per_s: speed_deg_per_s.map(|speed| speed * self.speed / finer),
-                    narrowest_deg: narrowest_deg.map(|width| finer_step(width * self.speed)),
-                }
-            }
+            Schedule::Sweep {
+                x_count,
+                y_count,
+                phi_step_deg,
+                speed_deg_per_s,
+                narrowest_feature_deg,
+            } => Schedule::Sweep {
+                x_count,
+                y_count,
+                phi_step_deg: finer_pairs(phi_step_deg),
+                speed_deg_per_s: speed_deg_per_s.map(|speed| speed * self.speed / finer),
+                narrowest_feature_deg: narrowest_feature_deg
+                    .map(|width| finer_step(width * self.speed)),
+            },
             list @ Schedule::List { .. } => list,
         };
         if plan.list_file().is_none() {
@@ -132,10 +137,12 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
             vec![set("theta_step_deg", theta_step_deg), set("phi_step_deg", phi_step_deg)]
         }
         Schedule::LowDiscrepancy { count } => vec![Change::set("schedule", "count", count)],
-        Schedule::Sweep { phi_step_deg, speed_deg_per_s, narrowest_deg, .. } => {
+        Schedule::Sweep { phi_step_deg, speed_deg_per_s, narrowest_feature_deg, .. } => {
             let mut changes = vec![set("phi_step_deg", phi_step_deg)];
             changes.extend(speed_deg_per_s.map(|speed| set("speed_deg_per_s", speed)));
-            changes.extend(narrowest_deg.map(|narrowest| set("narrowest_deg", narrowest)));
+            changes.extend(
+                narrowest_feature_deg.map(|narrowest| set("narrowest_feature_deg", narrowest)),
+            );
             changes
         }
         Schedule::List { .. } => Vec::new(),
@@ -182,17 +189,18 @@ mod tests {
     #[test]
     fn meridians_flown_in_pairs_stay_pairs() {
         let plan = plan(
-            "kind = \"sweep\"\nx_count = 1\ny_count = 1\nphi_step_deg = 20\nnarrowest_deg = 10",
+            "kind = \"sweep\"\nx_count = 1\ny_count = 1\nphi_step_deg = 20\nnarrowest_feature_deg = 10",
         );
         for rung in LADDER {
-            let Schedule::Sweep { phi_step_deg, narrowest_deg, .. } = rung.apply(&plan).schedule
+            let Schedule::Sweep { phi_step_deg, narrowest_feature_deg, .. } =
+                rung.apply(&plan).schedule
             else {
                 panic!("a sweep stays a sweep");
             };
             let pairs = 180.0 / phi_step_deg;
             assert!((pairs - libm::round(pairs)).abs() < 1e-12, "{phi_step_deg}");
             let narrowest = 10.0 / libm::sqrt(rung.density);
-            assert!((narrowest_deg.unwrap() - narrowest).abs() < 1e-12);
+            assert!((narrowest_feature_deg.unwrap() - narrowest).abs() < 1e-12);
             assert_eq!(rung.text(&plan).unwrap().schedule, rung.apply(&plan).schedule);
         }
     }

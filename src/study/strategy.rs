@@ -75,7 +75,7 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
     };
     // What the grid resolves where the plan doesn't say what there is to resolve.
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
-    let narrowest_deg = declared.unwrap_or(2.0 * theta_step_deg);
+    let narrowest_feature_deg = declared.unwrap_or(2.0 * theta_step_deg);
     let gone = ["count", "theta_step_deg", "gamma_step_deg", "c_step_deg", "order"];
     let mut changes: Vec<Change> =
         gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
@@ -83,19 +83,21 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
     changes.push(Change::set("schedule", "x_count", places.0));
     changes.push(Change::set("schedule", "y_count", places.1));
     changes.push(Change::set("schedule", "phi_step_deg", phi_step_deg));
-    changes.push(Change::set("schedule", "narrowest_deg", narrowest_deg));
+    changes.push(Change::set("schedule", "narrowest_feature_deg", narrowest_feature_deg));
     Some(changes)
 }
 
 fn grid(plan: &Plan) -> Option<Vec<Change>> {
-    let Schedule::Sweep { phi_step_deg, narrowest_deg, .. } = plan.schedule else { return None };
+    let Schedule::Sweep { phi_step_deg, narrowest_feature_deg, .. } = plan.schedule else {
+        return None;
+    };
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
-    let narrowest_deg = narrowest_deg.or(declared).unwrap_or(phi_step_deg);
-    let gone = ["speed_deg_per_s", "narrowest_deg", "window_ms"];
+    let narrowest_feature_deg = narrowest_feature_deg.or(declared).unwrap_or(phi_step_deg);
+    let gone = ["speed_deg_per_s", "narrowest_feature_deg", "window_ms"];
     let mut changes: Vec<Change> =
         gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
     changes.push(Change::set("schedule", "kind", "\"raster\""));
-    changes.push(Change::set("schedule", "theta_step_deg", 0.5 * narrowest_deg));
+    changes.push(Change::set("schedule", "theta_step_deg", 0.5 * narrowest_feature_deg));
     Some(changes)
 }
 
@@ -129,11 +131,11 @@ mod tests {
             y_count: 3,
             phi_step_deg: 30.0,
             speed_deg_per_s: None,
-            narrowest_deg: Some(10.0),
+            narrowest_feature_deg: Some(10.0),
         };
         assert_eq!(flown, expected);
         let sweep = plan(
-            "kind = \"sweep\"\nx_count = 2\ny_count = 3\nphi_step_deg = 30\nnarrowest_deg = 10\n\
+            "kind = \"sweep\"\nx_count = 2\ny_count = 3\nphi_step_deg = 30\nnarrowest_feature_deg = 10\n\
              window_ms = 5",
         );
         assert_eq!(into(Strategy::StopAndGo, &sweep), raster.schedule);
