@@ -48,7 +48,8 @@ pub(crate) struct FitArgs {
     pub(crate) at: Option<PathBuf>,
     /// Derive a quantity with its uncertainty: "KIND KEY=VALUE ..." or a .toml file of [[derive]]
     /// tables; may be given several times. Kinds: radiance, exitance, intensity, peak_intensity,
-    /// centre_beam_intensity, flux, irradiance, beam_angle, field_angle, environment, two_plane.
+    /// centre_beam_intensity, flux, irradiance, beam_angle, field_angle, environment, two_plane;
+    /// at the point of an environment cylindrical_irradiance and spherical_irradiance too.
     /// Example: --derive "irradiance at_mm=0,0,500 normal=0,0,-1"
     #[arg(long, value_name = "SPEC")]
     pub(crate) derive: Vec<String>,
