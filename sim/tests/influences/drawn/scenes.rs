@@ -29,7 +29,7 @@ const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-
 pub(super) type Draw = fn(&mut Dice) -> Case;
 
 /// Shadows are tried twice: of a disk and of a ball.
-pub(super) const EFFECTS: [Draw; 10] = [
+pub(super) const EFFECTS: [Draw; 14] = [
     weak_lamp,
     shadow,
     shadow,
@@ -40,6 +40,10 @@ pub(super) const EFFECTS: [Draw; 10] = [
     finite_beam,
     beam_over_a_panel,
     beam_past_a_ball,
+    interreflection,
+    gloss_under_a_sky,
+    shadow_under_a_sky,
+    window_over_a_lit_panel,
 ];
 
 fn case(effect: &'static str, scene: String) -> Case {
@@ -213,9 +217,69 @@ fn beam_past_a_ball(dice: &mut Dice) -> Case {
     Case { likely: (0..16).map(limb).collect(), has_beam: true, ..case("finite-beam", scene) }
 }
 
+/// Of a wall beside the region, from nearly black to bright, that a lamp lights.
+fn interreflection(dice: &mut Dice) -> Case {
+    let (albedo, x) = (dice.decades(-7.0, -0.05), dice.uniform(11.0, 30.0));
+    let (high, lamp_x) = (dice.uniform(5.0, 40.0), dice.uniform(-200.0, -60.0));
+    let scene = format!(
+        "{PANEL}[[surface]]\nkind = \"lambertian\"\nalbedo = {albedo}\n\
+         corners_mm = [[{x}, 40, 0], [{x}, -40, 0], [{x}, -40, {high}], [{x}, 40, {high}]]\n\
+         [[lamp]]\nkind = \"sphere\"\ncentre_mm = [{lamp_x}, 0, 400]\nradius_mm = 20\n\
+         radiance_w_per_m2_sr = 100\n"
+    );
+    let likely = [-6.0, 0.0, 6.0].map(|y| [HALF_MM, y, 0.0, 0.0]).to_vec();
+    Case { likely, ..case("interreflection", scene) }
+}
+
+/// Of a sky of a few pixels, from a gleam to a mirror.
+fn gloss_under_a_sky(dice: &mut Dice) -> Case {
+    let (gloss, exponent) = (dice.decades(-8.0, -0.35), dice.decades(-1.0, 2.0));
+    let scene = format!(
+        "[[surface]]\nkind = \"glossy\"\nalbedo = 0.5\ngloss = {gloss}\nexponent = {exponent}\n\
+         x_mm = [-50, 50]\ny_mm = [-50, 50]\n\
+         [[lamp]]\nkind = \"environment\"\nfile = \"sky.pgm\"\nradiance_w_per_m2_sr = 10\n"
+    );
+    case("gloss[0]", scene)
+}
+
+/// Of a ball above the region, as small as a grain.
+fn shadow_under_a_sky(dice: &mut Dice) -> Case {
+    let place = [dice.uniform(-8.0, 8.0), dice.uniform(-8.0, 8.0)];
+    let (z, radius) = (dice.uniform(320.0, 500.0), 100.0 * dice.decades(-3.5, 0.0));
+    let scene = format!(
+        "{PANEL}[[lamp]]\nkind = \"environment\"\nfile = \"sky.pgm\"\nradiance_w_per_m2_sr = 10\n\
+         [[occluder]]\nkind = \"sphere\"\ncentre_mm = [{}, {}, {z}]\nradius_mm = {radius}\n",
+        place[0], place[1]
+    );
+    let likely = vec![[place[0], place[1], 0.0, 0.0]];
+    Case { likely, ..case("shadow[0]", scene) }
+}
+
+/// Of the sample, over a panel that a disk or the sky lights.
+fn window_over_a_lit_panel(dice: &mut Dice) -> Case {
+    let (index, absorption) = (1.0 + dice.decades(-5.0, -0.1), dice.decades(-9.0, -1.0));
+    let (z, thickness) = (dice.uniform(5.0, 30.0), dice.uniform(1.0, 6.0));
+    let lamp = if dice.uniform(0.0, 1.0) < 0.5 {
+        let (x, r) = (dice.uniform(-200.0, 200.0), dice.uniform(10.0, 50.0));
+        format!("kind = \"disk\"\ncentre_mm = [{x}, 0, 400]\naxis = [0, 0, -1]\nradius_mm = {r}\n")
+    } else {
+        "kind = \"environment\"\nfile = \"sky.pgm\"\n".to_owned()
+    };
+    let scene = format!(
+        "{PANEL}[[lamp]]\n{lamp}radiance_w_per_m2_sr = 10\n\
+         [[window]]\nz_mm = {z}\nthickness_mm = {thickness}\nindex = {index}\n\
+         absorption_per_mm = {absorption}\nbelongs_to = \"sample\"\n"
+    );
+    let likely = (0..8).map(|k| [0.0, 0.0, THETA_MAX, f64::from(k) - PI]).collect();
+    Case { likely, ..case("window[0]", scene) }
+}
+
 fn read(text: &str) -> Scene {
     let document = Document::parse(Source::new("scene.toml", text)).unwrap();
-    let load = |name: &str| Err(format!("{name}: no such file"));
+    let load = |name: &str| match name {
+        "sky.pgm" => Ok(b"P2 4 4 9\n4 1 0 9 1 2 3 1 0 0 0 0 0 0 0 0\n".to_vec()),
+        _ => Err("no such file".to_owned()),
+    };
     Scene::read(&document, Quantity::Radiance, &load).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
