@@ -116,8 +116,8 @@ pub(super) fn across_rays(setting: &Setting<'_>, beam: &Beam, patches: &[Patch])
             let lean = (place - edge).try_normalize().unwrap_or(DVec2::X).to_angle();
             for theta in [theta_max_rad, theta_max_rad / 2.0, 0.0] {
                 // The footprint is longest away from the detector: over the edge if that leans
-                // to the other side.
-                let turns = [0.0, TAU / 8.0, TAU / 4.0, TAU / 2.0];
+                // to the other side. What leaves the patch need not be alike on both sides.
+                let turns = [0.0, 0.125, 0.25, 0.5, 0.75, 0.875].map(|part| part * TAU);
                 let turns = if theta > 0.0 { &turns[..] } else { &turns[..1] };
                 rays.extend(
                     turns.iter().map(|turn| Ray::new(place.x, place.y, theta, lean + turn)),
