@@ -15,6 +15,7 @@ use super::setup::{no_scene, rig_at, stage_at};
 use super::shop::Shop;
 use super::simulated::StopSignals;
 use crate::daemon::{Address, Config, Daemon, DaemonError, RigThread, Shutdown};
+use crate::journal::EffectWishes;
 use crate::run::own;
 
 /// Owns a rig until it is told to stop.
@@ -39,7 +40,7 @@ fn open_shop(args: &DaemonArgs) -> Result<Shop, Failure> {
     let rig = rig_at(&mut inputs, &args.rig)?;
     let stage = match (&args.scene, rig.is_simulated()) {
         (Some(scene), true) => {
-            Some(stage_at(&mut inputs, scene, &rig, &sim::Terms::seeded(args.seed))?)
+            Some(stage_at(&mut inputs, scene, &rig, &args.effects.terms(args.seed))?)
         }
         (None, false) => None,
         (None, true) => {
@@ -52,7 +53,9 @@ fn open_shop(args: &DaemonArgs) -> Result<Shop, Failure> {
             ));
         }
     };
-    Ok(Shop { rig, stage, inputs: inputs.read().to_vec(), seed: args.seed })
+    // The rig is compiled when the daemon begins, before any plan.
+    let wishes = EffectWishes { ignores_plan: true, ..args.effects.wishes() };
+    Ok(Shop { rig, stage, inputs: inputs.read().to_vec(), seed: args.seed, wishes })
 }
 
 fn start_rig(shop: &Shop) -> Result<RigThread, Failure> {

@@ -32,6 +32,8 @@ pub(crate) struct Shop {
     /// The rig's file, the scene's, and what that names, byte for byte.
     pub(crate) inputs: Vec<Input>,
     pub(crate) seed: u64,
+    /// On which terms the rig's effects were chosen.
+    pub(crate) wishes: EffectWishes,
 }
 
 impl Shop {
@@ -55,9 +57,7 @@ impl Shop {
         let theirs =
             sent.into_iter().filter(|i| matches!(i.role, InputRole::Plan | InputRole::Attachment));
         let inputs = self.inputs.iter().cloned().chain(theirs).collect();
-        // The rig was compiled when the daemon began, before any plan.
-        let wishes = EffectWishes { ignores_plan: true, ..EffectWishes::default() };
-        let setup = Setup::from_inputs(inputs, name, self.seed, wishes)
+        let setup = Setup::from_inputs(inputs, name, self.seed, self.wishes.clone())
             .map_err(|failure| Refusal::new(failure.text()))?;
         Ok((setup, notes))
     }

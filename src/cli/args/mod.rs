@@ -369,6 +369,8 @@ pub(crate) struct DaemonArgs {
     /// The seed of everything random on a simulated rig.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) effects: EffectArgs,
     /// Where runs and the queue are kept.
     #[arg(long, default_value = "gonio-data", value_name = "DIR")]
     pub(crate) data: PathBuf,
