@@ -289,8 +289,26 @@ fn what_is_not_simulated_is_refused_by_name() {
         let refused = sim::compile(scene(text), rig(), Simulated::default(), &terms(10.0, 60.0));
         refused.unwrap_err().to_string()
     };
-    let through = refused(&format!("{PANEL}{lamp}{window}"));
-    assert!(through.contains("lamp[0] through window[0]"), "{through}");
-    let shaded = refused(&format!("{PANEL}{sky}{ball}"));
-    assert!(shaded.contains("behind occluder[0]"), "{shaded}");
+    let high = ball.replace("100]", "90]");
+    let shaded = refused(&format!("{PANEL}{lamp}{high}{window}"));
+    let expected = "the shadow of occluder[0] in the light of lamp[0] that comes through a window";
+    assert!(shaded.contains(expected), "{shaded}");
+    let wall = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.5\n\
+                corners_mm = [[60, -9, 0], [60, -9, 9], [60, 9, 9], [60, 9, 0]]\n";
+    let between = refused(&format!("{PANEL}{wall}{sky}{window}"));
+    assert!(between.contains("see each other"), "{between}");
+}
+
+#[test]
+fn a_surface_above_a_window_is_not_behind_it() {
+    let sun = "[[lamp]]\nkind = \"sun\"\ntheta_deg = 40\nphi_deg = 30\n";
+    let above = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.5\n\
+                 corners_mm = [[-2, -2, 40], [2, -2, 40], [2, 2, 40], [-2, 2, 40]]\n";
+    let window = "[[window]]\nz_mm = 20\nthickness_mm = 6\nindex = 1.5\nbelongs_to = \"sample\"\n";
+    let panel = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0\nx_mm = [-9, 9]\ny_mm = [-9, 9]\n";
+    let of =
+        |text: &str| compiled(text, &terms(10.0, 60.0)).radiance(&Ray::new(0.0, 0.0, 0.0, 0.0));
+    let clear = of(&format!("{panel}{above}{sun}"));
+    let glass = of(&format!("{panel}{above}{sun}{window}"));
+    assert!(clear > 0.0 && (glass / clear - 1.0).abs() < 1e-12, "{glass} {clear}");
 }

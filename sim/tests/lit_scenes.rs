@@ -259,14 +259,6 @@ fn glossy_surfaces_that_are_not_simulated_are_refused_with_their_place() {
         ),
         (
             format!(
-                "{glossy}gloss = 0.1\n[[lamp]]\nkind = \"environment\"\nfile = \"image.pgm\"\n\
-                     radiance_w_per_m2_sr = 1\n"
-            ),
-            "scene.toml:2:8",
-            "light of lamp[0], an environment, on surface[0], glossy",
-        ),
-        (
-            format!(
                 "{glossy}gloss = 0.1\n{LAMP}[[window]]\nz_mm = 9\nthickness_mm = 5\n\
                  index = 1.5\nbelongs_to = \"sample\"\n"
             ),

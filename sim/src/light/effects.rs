@@ -70,7 +70,11 @@ pub(crate) fn candidates(setting: &Setting<'_>) -> Result<Vec<Candidate>, Compil
         };
         let cause = format!("window[{i}].index = {}, of the {owner}", window.index);
         let how = "Fresnel's and Beer's laws with all reflections inside; the ray shifted sideways";
-        found.push(weighing.candidate(format!("window[{i}]"), Some(cause), how)?);
+        let mut candidate = weighing.candidate(format!("window[{i}]"), Some(cause), how)?;
+        let is_own = window.belongs_to == WindowOwner::Sample && !scene.surfaces().is_empty();
+        let error = if is_own { weighing.error_of_rules()? } else { 0.0 };
+        candidate.error = (error > 0.0).then_some(error);
+        found.push(candidate);
         let returns = returning(scene)?.is_some_and(|(returning, _)| returning == i);
         let cause = returns.then(|| format!("window[{i}] mirrors the patches below it"));
         let how = "solved once, at nodes on each patch";
@@ -135,17 +139,28 @@ impl Weighing<'_> {
         let how = "once along the outline of what is seen of each lamp, by Stokes, with 8 nodes on \
                    pieces no longer than the lobe is wide";
         let mut candidate = self.candidate(format!("gloss[{i}]"), Some(cause), how)?;
+        candidate.error = Some(self.error_of_rules()?);
+        Ok(Some(candidate))
+    }
+
+    /// How far readings are from what more nodes say, of lobes and of what comes through windows.
+    fn error_of_rules(&self) -> Result<f64, CompileError> {
         let mut finer = LitScene::new(self.setting.scenery, self.distance_m, &|_| true)?;
-        finer.refine_lobes();
-        let brightest = self.seen.iter().map(|(_, seen)| *seen).fold(0.0, f64::max);
+        if !finer.refine() {
+            return Ok(0.0);
+        }
         let every = self.seen.len().div_ceil(LOBES).max(1);
         let apart = self.seen.iter().step_by(every).map(|(ray, a)| {
             let b = finer.radiance(ray);
-            let scale = a.max(b).max(self.setting.floor).max(DIM * brightest);
-            if scale > 0.0 { (a - b).abs() / scale } else { 0.0 }
+            (a - b).abs() / self.scale(a.max(b))
         });
-        candidate.error = Some(apart.fold(f64::EPSILON, f64::max));
-        Ok(Some(candidate))
+        Ok(apart.fold(f64::EPSILON, f64::max))
+    }
+
+    /// What an error of a reading stands beside.
+    fn scale(&self, reading: f64) -> f64 {
+        let brightest = self.seen.iter().map(|(_, seen)| *seen).fold(0.0, f64::max);
+        reading.max(self.setting.floor).max(DIM * brightest).max(f64::MIN_POSITIVE)
     }
 
     /// Of scenes with two surfaces or more.

@@ -10,7 +10,10 @@ mod landmarks;
 mod patches;
 mod plate;
 mod returned;
+mod rings;
 mod scenery;
+mod smooth;
+mod source;
 
 use std::sync::Arc;
 
@@ -129,15 +132,21 @@ impl LitScene {
         Ok(lit)
     }
 
-    /// With more nodes over each lobe.
-    fn refine_lobes(&mut self) {
+    /// With more nodes over each lobe, and over what comes through windows; whether there are any.
+    fn refine(&mut self) -> bool {
+        let mut is_any = false;
         for part in self.flat.iter_mut().chain(&mut self.raised) {
-            if let Glow::Lit(lit) = &mut part.glow
-                && let Some(gloss) = &mut lit.gloss
-            {
+            let Glow::Lit(lit) = &mut part.glow else { continue };
+            if let Some(gloss) = &mut lit.gloss {
                 *gloss = gloss.finer();
+                is_any = true;
+            }
+            if let Some(finer) = lit.lighting.finer() {
+                lit.lighting = Arc::new(finer);
+                is_any = true;
             }
         }
+        is_any
     }
 
     /// Of the sample's window, if it has one and patches that it can light.

@@ -27,8 +27,13 @@ fn patch(i: usize, part: &Part) -> Option<Patch> {
             Patch::of_emitter(i, emitter).map(|own| Patch { name: part.name.clone(), ..own })
         }
         Glow::Lit(lit) => {
-            let is_lambertian = lit.gloss.is_none();
-            let goes = if is_lambertian { Goes::WithPlace } else { Goes::WithBoth };
+            let goes = match &lit.gloss {
+                None => Goes::WithPlace,
+                Some(_) if lit.lighting.is_of_sky_alone() => {
+                    Goes::WithDirection { is_round: false }
+                }
+                Some(_) => Goes::WithBoth,
+            };
             Some(Patch::new(part.name.clone(), part.body.shape()?, goes))
         }
         Glow::Black | Glow::Lamp(_) => None,

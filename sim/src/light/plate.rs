@@ -70,8 +70,17 @@ impl Plate {
         (lower, self.pane.reflectance(incidence))
     }
 
-    /// What passes, towards a unit direction above the plane.
-    pub(super) fn transmittance(&self, direction: DVec3) -> f64 {
-        self.passage(direction).transmittance
+    /// What passes, at an angle with this cosine.
+    pub(super) fn transmittance(&self, cos: f64) -> f64 {
+        let incidence = Incidence::from_cos(cos.clamp(0.0, 1.0));
+        incidence.map_or(0.0, |incidence| self.pane.transmittance(incidence))
+    }
+
+    /// By how much higher a place below looks from above, at an angle with this cosine:
+    /// d (1 - tan θ₂ / tan θ₁).
+    pub(super) fn raises_m(&self, cos: f64) -> f64 {
+        let sin_square = (1.0 - cos) * (1.0 + cos);
+        let inside = libm::sqrt(self.index * self.index - sin_square);
+        if inside > 0.0 { self.thickness_m * (1.0 - cos / inside) } else { 0.0 }
     }
 }

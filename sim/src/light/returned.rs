@@ -13,11 +13,14 @@ use radiometry::quadrature::gauss_legendre;
 
 use super::lamps::Lighting;
 use super::plate::Plate;
+use super::smooth::Smooth;
 use crate::scene::{Emitter, Shape};
 
 /// Nodes along each side, and fewer, for an estimate of the error.
 const NODES: usize = 10;
 const FEWER: usize = 7;
+/// Places along each side at which what comes back is kept.
+const POINTS: usize = 13;
 /// Rounds of reflection at most; each is weaker by a plate's reflectance and more.
 const ROUNDS: usize = 60;
 
@@ -40,7 +43,7 @@ enum NodeGlow {
 /// as the plate, so that values at a few places stand for all.
 #[derive(Debug)]
 pub(super) struct Returned {
-    smooth: Vec<Smooth>,
+    smooth: Vec<Smooth<POINTS>>,
     /// How far irradiances may be off, relative to the largest direct one.
     pub(super) error: f64,
 }
@@ -55,10 +58,11 @@ impl Returned {
     pub(super) fn new(plate: Plate, patches: &[Patch<'_>]) -> Self {
         let solved = Solved::new(plate, patches, NODES);
         let rough = Solved::new(plate, patches, FEWER);
-        let smooth: Vec<Smooth> = patches
+        let of = |place: DVec2| solved.irradiance(place);
+        let smooth: Vec<Smooth<POINTS>> = patches
             .iter()
             .filter_map(|patch| match patch {
-                Patch::Lit { shape, .. } => Some(Smooth::new(shape, &solved)),
+                Patch::Lit { shape, .. } => Some(Smooth::new(shape, &of)),
                 Patch::Emits(_) => None,
             })
             .collect();
@@ -79,70 +83,6 @@ impl Returned {
         let on = self.smooth.iter().find(|smooth| smooth.holds(place));
         on.map_or(0.0, |smooth| smooth.at(place))
     }
-}
-
-/// A smooth function over a rectangle, interpolated between Chebyshev's points (Berrut and Trefethen
-/// 2004).
-#[derive(Debug)]
-struct Smooth {
-    x_m: (f64, f64),
-    y_m: (f64, f64),
-    /// Row after row along x.
-    values: Vec<f64>,
-    /// Chebyshev's points of [0, 1].
-    points: [f64; POINTS + 1],
-}
-
-/// Points along each side, less one.
-const POINTS: usize = 12;
-
-impl Smooth {
-    fn new(shape: &Shape, solved: &Solved) -> Self {
-        let (x_m, y_m) = shape.bounding_box();
-        let at = |(low, high): (f64, f64), i: usize| low + (high - low) * chebyshev(i);
-        let places = (0..=POINTS).flat_map(|k| (0..=POINTS).map(move |i| (i, k)));
-        let values = places.map(|(i, k)| solved.irradiance(DVec2::new(at(x_m, i), at(y_m, k))));
-        Self { x_m, y_m, values: values.collect(), points: core::array::from_fn(chebyshev) }
-    }
-
-    fn holds(&self, place: DVec2) -> bool {
-        let within = |(low, high): (f64, f64), at: f64| (low..=high).contains(&at);
-        within(self.x_m, place.x) && within(self.y_m, place.y)
-    }
-
-    fn at(&self, place: DVec2) -> f64 {
-        let part = |(low, high): (f64, f64), at: f64| (at - low) / (high - low);
-        let along = shares(&self.points, part(self.x_m, place.x));
-        let across = shares(&self.points, part(self.y_m, place.y));
-        let rows = self.values.chunks_exact(POINTS + 1).zip(across);
-        let row = |(values, share): (&[f64], f64)| {
-            share * values.iter().zip(along).map(|(value, share)| value * share).sum::<f64>()
-        };
-        rows.map(row).sum()
-    }
-}
-
-/// The i-th point of [0, 1].
-fn chebyshev(i: usize) -> f64 {
-    let half = libm::sin(PI * i as f64 / (2.0 * POINTS as f64));
-    half * half
-}
-
-/// What each point's value counts at a place of [0, 1].
-fn shares(points: &[f64; POINTS + 1], place: f64) -> [f64; POINTS + 1] {
-    let mut shares = [0.0; POINTS + 1];
-    for (i, share) in shares.iter_mut().enumerate() {
-        let apart = place - points[i];
-        if apart == 0.0 {
-            let mut one = [0.0; POINTS + 1];
-            one[i] = 1.0;
-            return one;
-        }
-        let ends = if i == 0 || i == POINTS { 0.5 } else { 1.0 };
-        *share = if i % 2 == 0 { ends } else { -ends } / apart;
-    }
-    let sum: f64 = shares.iter().sum();
-    shares.map(|share| share / sum)
 }
 
 /// What the plane sends up, once all is settled.

@@ -1,6 +1,6 @@
 //! What reflects: a body, and how. It emits nothing of its own.
 
-use super::{Body, EXPONENT_MAX, LampSource, Scene, SceneError, WindowOwner};
+use super::{Body, EXPONENT_MAX, Scene, SceneError, Window, WindowOwner};
 
 /// A surface that is lit.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,23 +90,15 @@ impl Scene {
     /// A glossy surface, and what is not simulated of the light on it, if that is so.
     pub(crate) fn unsupported_gloss(&self) -> Option<(usize, String)> {
         let is_glossy = |i: usize| !self.surfaces()[i].reflection().is_lambertian();
-        let i = (0..self.surfaces().len()).find(|i| is_glossy(*i))?;
-        if let Some((a, b)) =
-            self.facing().into_iter().find(|(a, b)| is_glossy(*a) || is_glossy(*b))
-        {
+        let mut pairs = self.facing().into_iter();
+        if let Some((a, b)) = pairs.find(|(a, b)| is_glossy(*a) || is_glossy(*b)) {
             let (own, other) = if is_glossy(a) { (a, b) } else { (b, a) };
             let what = format!("light between surface[{own}], glossy, and surface[{other}]");
             return Some((own, what));
         }
-        let is_sky = |source: &LampSource| matches!(source, LampSource::Surrounding(_));
-        if let Some(k) = self.lamps().iter().position(|lamp| is_sky(lamp.source())) {
-            return Some((
-                i,
-                format!("light of lamp[{k}], an environment, on surface[{i}], glossy"),
-            ));
-        }
-        let glass = |owner| owner == WindowOwner::Sample;
-        let k = self.windows().iter().position(|window| glass(window.belongs_to))?;
+        let i = (0..self.surfaces().len()).find(|i| is_glossy(*i))?;
+        let is_own = |window: &Window| window.belongs_to == WindowOwner::Sample;
+        let k = self.windows().iter().position(is_own)?;
         Some((i, format!("surface[{i}], glossy, under window[{k}] of the sample")))
     }
 }

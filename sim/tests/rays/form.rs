@@ -111,6 +111,18 @@ impl Form {
         }
     }
 
+    /// A ball that holds it.
+    pub(crate) fn ball(&self) -> (DVec3, f64) {
+        match self {
+            Self::Disk { centre, radius, .. } | Self::Ball { centre, radius } => (*centre, *radius),
+            Self::Polygon { corners, .. } => {
+                let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
+                (middle, corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max))
+            }
+            Self::HalfPlane { .. } => panic!("{self:?} has no end"),
+        }
+    }
+
     /// A place on it as seen from a point, and one over the density of its direction: of a ball
     /// evenly over the directions, of what is flat evenly over the area.
     pub(crate) fn aim(&self, from: DVec3, dice: &mut Dice) -> (DVec3, f64) {

@@ -6,13 +6,13 @@ use sim::{Lamp, LampSource};
 use crate::bench::exact_rig;
 use crate::{Both, agree, axis, read};
 
-const PATHS: u32 = 100_000;
-const RAYS: u32 = 40_000;
+pub(crate) const PATHS: u32 = 100_000;
+pub(crate) const RAYS: u32 = 40_000;
 
-const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-50, 50]\n\
+pub(crate) const PANEL: &str = "[[surface]]\nkind = \"lambertian\"\nalbedo = 0.8\nx_mm = [-50, 50]\n\
                      y_mm = [-50, 50]\n";
 
-const LAMPS: [(&str, &str); 5] = [
+pub(crate) const LAMPS: [(&str, &str); 5] = [
     (
         "disk",
         "centre_mm = [60, 0, 90]\naxis = [-0.5, 0, -1]\nradius_mm = 30\nradiance_w_per_m2_sr = 10\n",
@@ -26,7 +26,7 @@ const LAMPS: [(&str, &str); 5] = [
     ("environment", "file = \"sky.pgm\"\nradiance_w_per_m2_sr = 10\n"),
 ];
 
-fn lamp((kind, place): (&str, &str)) -> String {
+pub(crate) fn lamp((kind, place): (&str, &str)) -> String {
     format!("[[lamp]]\nkind = \"{kind}\"\n{place}")
 }
 
@@ -58,7 +58,7 @@ fn a_lambertian_panel_is_as_bright_as_every_lamp_makes_it() {
     }
 }
 
-const GLOSSY: &str = "[[surface]]\nkind = \"glossy\"\nalbedo = 0.2\ngloss = 0.6\nexponent = 12\n\
+pub(crate) const GLOSSY: &str = "[[surface]]\nkind = \"glossy\"\nalbedo = 0.2\ngloss = 0.6\nexponent = 12\n\
                       x_mm = [-50, 50]\ny_mm = [-50, 50]\n";
 
 #[test]
@@ -141,7 +141,7 @@ fn a_lid_hides_a_part_of_what_a_wall_sends() {
 }
 
 /// Near the panel, so that all penumbras fall across the poses.
-const BODIES: [&str; 4] = [
+pub(crate) const BODIES: [&str; 4] = [
     "kind = \"half-plane\"\nx_max_mm = 12\nz_mm = 20\n",
     "kind = \"disk\"\ncentre_mm = [18, 0, 25]\naxis = [1, 0.2, 1]\nradius_mm = 9\n",
     "kind = \"sphere\"\ncentre_mm = [-22, 17, 22]\nradius_mm = 8\n",

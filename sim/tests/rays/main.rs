@@ -15,6 +15,7 @@ mod dice;
 mod form;
 mod glass;
 mod lit;
+mod panes;
 mod world;
 
 use glam::DVec3;
@@ -45,9 +46,25 @@ struct Both {
 
 impl Both {
     fn new(scene: Scene, laws: &[fn(DVec3) -> f64], nominal: Nominal) -> Self {
+        Self::without(&[], scene, laws, nominal)
+    }
+
+    /// Along axes alone: to choose a beam takes longer than to look along some rays.
+    fn of_axes(text: &str) -> Self {
+        Self::without(&["finite-beam"], read(text), &[], bench::exact_rig())
+    }
+
+    fn without(
+        effects: &[&str],
+        scene: Scene,
+        laws: &[fn(DVec3) -> f64],
+        nominal: Nominal,
+    ) -> Self {
         let side = (-10.0 * MM, 10.0 * MM);
         let region = Region { x_m: side, y_m: side, theta_max_rad: 75f64.to_radians() };
-        let terms = Terms { region: Some(region), tolerance: Some(1e-5), ..Terms::default() };
+        let without = effects.iter().map(|name| (*name).to_owned()).collect();
+        let (region, tolerance) = (Some(region), Some(1e-5));
+        let terms = Terms { region, tolerance, without, ..Terms::default() };
         let world = World::new(&scene, laws);
         let compiled = compile(scene, nominal.clone(), Simulated::default(), &terms);
         Self { compiled: compiled.unwrap_or_else(|e| panic!("{e}")), world, nominal }
@@ -63,6 +80,14 @@ impl Both {
     fn seen(&self, axis: &Axis, rays: u32) -> (f64, Mean) {
         let found = self.compiled.seen_radiance(axis);
         (found, reading(&self.world, &self.nominal.detector, axis, rays, 1))
+    }
+
+    /// One ray of what leaves the sample, from a place on its way that nothing is before.
+    fn leaving(&self, axis: &Axis, z_m: f64, paths: u32) -> (f64, Mean) {
+        let ray = Ray { point: axis.spot, direction: axis.direction };
+        let from = axis.spot + axis.direction * (z_m / axis.direction.z);
+        let mean = beam::along(&self.world, from, -axis.direction, paths, 3);
+        (self.compiled.radiance(&ray), mean)
     }
 
     /// One ray, of what leaves the sample's plane, below all that stands above it.

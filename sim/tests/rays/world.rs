@@ -214,6 +214,10 @@ impl World {
             if matches!(source.matter, Matter::Black | Matter::Reflects(_)) {
                 continue;
             }
+            if self.has_glass() {
+                sum += self.through_glass(source, at, normal, f, dice);
+                continue;
+            }
             let (place, solid_angle) = source.form.aim(at, dice);
             let towards = (place - at).normalize();
             let there = source.form.normal(place);
@@ -230,14 +234,50 @@ impl World {
         for (towards, half_angle, radiance) in &self.suns {
             let direction = dice.in_cone(*towards, *half_angle);
             let solid_angle = TAU * 2.0 * (half_angle / 2.0).sin().powi(2);
-            let is_free = self.nearest(at, direction).is_none();
             let cos = normal.dot(direction);
-            if cos > 0.0 && direction.z > 0.0 && is_free {
-                let passed = self.passes(direction, dice);
+            if cos > 0.0 && direction.z > 0.0 {
+                let walk = self.walk(at, direction, &|owner| owner == WindowOwner::Sample, dice);
+                let is_free = walk.end.is_none() && !walk.is_mirrored;
+                let passed = if is_free { walk.part } else { 0.0 };
                 sum += radiance * f(direction) * cos * solid_angle * passed;
             }
         }
         sum
+    }
+
+    fn has_glass(&self) -> bool {
+        self.glasses.iter().any(|(_, owner)| *owner == WindowOwner::Sample)
+    }
+
+    /// By a direction in which a source may be seen, however glass shifts it.
+    fn through_glass(
+        &self,
+        source: &Thing,
+        at: DVec3,
+        normal: DVec3,
+        f: &dyn Fn(DVec3) -> f64,
+        dice: &mut Dice,
+    ) -> f64 {
+        let (centre, radius) = source.form.ball();
+        let thick: f64 = self.glasses.iter().map(|(glass, _)| glass.high - glass.low).sum();
+        let part = (radius + thick) / centre.distance(at);
+        let half_angle = if part < 1.0 { part.asin() } else { PI };
+        let direction = dice.in_cone((centre - at).normalize(), half_angle);
+        if normal.dot(direction) <= 0.0 {
+            return 0.0;
+        }
+        let walk = self.walk(at, direction, &|owner| owner == WindowOwner::Sample, dice);
+        let Some((there, _)) = walk.end.filter(|(_, thing)| core::ptr::eq(*thing, source)) else {
+            return 0.0;
+        };
+        let radiance = match &source.matter {
+            _ if walk.is_mirrored => 0.0,
+            Matter::Shines(radiance) => *radiance,
+            Matter::Emits(glow) => glow(there, source.form.normal(there), -walk.direction),
+            Matter::Black | Matter::Reflects(_) => 0.0,
+        };
+        let solid_angle = 2.0 * TAU * (half_angle / 2.0).sin().powi(2);
+        radiance * walk.part * f(direction) * normal.dot(direction) * solid_angle
     }
 
     fn sees(&self, at: DVec3, place: DVec3, source: &Thing) -> bool {
@@ -246,17 +286,6 @@ impl World {
             core::ptr::eq(thing, source)
                 || thing.form.hit(at, towards).is_none_or(|t| t > length * (1.0 - 1e-9))
         })
-    }
-
-    /// Of a photon of the sun, through the windows of the sample.
-    fn passes(&self, towards: DVec3, dice: &mut Dice) -> f64 {
-        let is_s = dice.roll() < 0.5;
-        let mut part = 1.0;
-        for (glass, _) in self.glasses.iter().filter(|(_, of)| *of == WindowOwner::Sample) {
-            let out = glass.pass(DVec3::new(0.0, 0.0, glass.high), -towards, is_s, dice);
-            part *= if out.direction.z < 0.0 { out.part } else { 0.0 };
-        }
-        part
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels

@@ -11,12 +11,13 @@
 
 mod moments;
 mod outline;
+mod surrounding;
 #[cfg(test)]
 mod tests;
 
 use std::sync::{Arc, OnceLock};
 
-use core::f64::consts::{FRAC_PI_2, TAU};
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 use radiometry::direction::{angle_between, normalised};
@@ -24,11 +25,15 @@ use radiometry::quadrature::gauss_legendre;
 
 use crate::scene::{Reflection, Solid};
 use moments::Moments;
-use outline::{Curve, Level};
+pub(super) use outline::{Curve, Level};
+pub(super) use surrounding::{Counts, Surrounding};
 
 /// Nodes on a piece of an outline; and more, to tell the error.
 const NODES: usize = 8;
 const FINER: usize = 14;
+/// On pieces much shorter than what happens along them.
+const FEW: usize = 3;
+const SHORT: f64 = 0.15;
 /// The length of a piece of an outline, in widths of the lobe or distances from its middle; radians
 /// at most; and how often it is halved at most.
 const LENGTH: f64 = 1.5;
@@ -40,6 +45,17 @@ const TURN_RAD: f64 = 1.6;
 const FAR: f64 = 3.0;
 /// How far beside an outline is looked, radians.
 const BESIDE_RAD: f64 = 1e-7;
+
+/// From where the integrals over α are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Taken {
+    /// From the mirror direction out.
+    Within,
+    /// From beyond the lobe in, far from its middle.
+    Beyond,
+    /// The same, as near to the middle as it may be.
+    AllAround,
+}
 
 /// What shines or hides, as directions from a place.
 #[derive(Debug, Clone)]
@@ -71,6 +87,16 @@ impl Gloss {
         Self { is_fine: true, ..self.clone() }
     }
 
+    /// Lambert's law as a lobe: 1/π of what arrives above a surface, looked at along its normal.
+    pub(super) fn of_all_that_arrives() -> &'static Self {
+        static WHOLE: OnceLock<Gloss> = OnceLock::new();
+        WHOLE.get_or_init(|| Self {
+            factor: 1.0 / PI,
+            moments: Arc::new(Moments::new(0.0)),
+            is_fine: false,
+        })
+    }
+
     /// At a place, for light that leaves into a direction.
     pub(super) fn lobe(&self, place: DVec3, normal: DVec3, into: DVec3) -> Lobe<'_> {
         let mirror = normal * (2.0 * normal.dot(into)) - into;
@@ -100,7 +126,7 @@ impl Lobe<'_> {
     /// What it sends on of a source of radiance 1 behind bodies.
     pub(super) fn radiance(&self, source: &Sight, before: &[Sight]) -> f64 {
         let moments = &*self.gloss.moments;
-        let cone = self.cone(source);
+        let cone = source.cone(self.place);
         let low = cone.map_or(0.0, |(towards, half)| angle_between(self.mirror, towards) - half);
         let height = |(towards, half): (DVec3, f64)| {
             let middle = FRAC_PI_2 - angle_between(self.normal, towards);
@@ -110,7 +136,7 @@ impl Lobe<'_> {
         if low >= moments.edge() || heights.1 <= 0.0 {
             return 0.0;
         }
-        let is_near = |body: &&Sight| match (cone, self.cone(body)) {
+        let is_near = |body: &&Sight| match (cone, body.cone(self.place)) {
             (Some((a, half_a)), Some((b, half_b))) => angle_between(a, b) < half_a + half_b,
             _ => true,
         };
@@ -121,6 +147,7 @@ impl Lobe<'_> {
             horizon.into_iter().chain([Bounding::Of(source)]).chain(bodies).collect();
         let levels: Vec<Vec<Level>> = all.iter().map(|own| self.levels(*own)).collect();
         let is_far = low > FAR * moments.width();
+        let taken = if is_far { Taken::Beyond } else { Taken::Within };
         let mut sum = 0.0;
         for (i, own) in all.iter().enumerate() {
             for curve in self.outline(*own) {
@@ -143,7 +170,7 @@ impl Lobe<'_> {
                         &before,
                     );
                     if side != 0.0 {
-                        sum += side * self.along(&curve, (pair[0], pair[1]), is_far, HALVINGS);
+                        sum += side * self.along(&curve, (pair[0], pair[1]), taken, HALVINGS);
                     }
                 }
             }
@@ -183,15 +210,16 @@ impl Lobe<'_> {
         let sides = [at + left * BESIDE_RAD, at - left * BESIDE_RAD];
         let holds = |of: &Bounding<'_>, towards: DVec3| match of {
             Bounding::Horizon => towards.dot(self.normal) > 0.0,
-            Bounding::Of(sight) => self.distance(sight, towards).is_some(),
+            Bounding::Of(sight) => sight.distance(self.place, towards).is_some(),
         };
         if earlier.iter().any(|of| holds(of, sides[0]) != holds(of, sides[1])) {
             return 0.0;
         }
         let is_seen = |towards: DVec3| {
-            let far = self.distance(source, towards).filter(|_| towards.dot(self.normal) > 0.0);
+            let far =
+                source.distance(self.place, towards).filter(|_| towards.dot(self.normal) > 0.0);
             let hides = |far: f64, body: &&Sight| {
-                self.distance(body, towards).is_some_and(|near| near < far)
+                body.distance(self.place, towards).is_some_and(|near| near < far)
             };
             far.is_some_and(|far| !before.iter().any(|body| hides(far, body)))
         };
@@ -200,7 +228,7 @@ impl Lobe<'_> {
     }
 
     /// Over a part of a curve, in pieces.
-    fn along(&self, curve: &Curve, (from, to): (f64, f64), is_far: bool, halvings: u32) -> f64 {
+    fn along(&self, curve: &Curve, (from, to): (f64, f64), taken: Taken, halvings: u32) -> f64 {
         let middle = f64::midpoint(from, to);
         let [Some(a), Some(b), Some(c)] = [from, middle, to].map(|t| normalised(curve.at(t).0))
         else {
@@ -213,29 +241,32 @@ impl Lobe<'_> {
             nearest - length / 2.0
         };
         let (ahead, moments) = (from_mirror(1.0), &*self.gloss.moments);
-        if is_far && ahead > moments.edge() {
+        if taken != Taken::Within && ahead > moments.edge() {
             return 0.0;
         }
-        let mut scale = ahead.max(moments.width());
-        if !is_far {
+        let scale = match taken {
             // The integrals from the mirror direction out have no limit right behind.
-            scale = scale.min(from_mirror(-1.0));
-        }
+            Taken::Within => ahead.max(moments.width()).min(from_mirror(-1.0)),
+            Taken::Beyond => ahead.max(moments.width()),
+            // Those from beyond have none in the middle.
+            Taken::AllAround => ahead.min(2.0 * moments.width()),
+        };
         let is_long =
             length > (LENGTH * scale).min(LONGEST_RAD) || curve.turns(from, to) > TURN_RAD;
         if halvings > 0 && is_long {
-            return self.along(curve, (from, middle), is_far, halvings - 1)
-                + self.along(curve, (middle, to), is_far, halvings - 1);
+            return self.along(curve, (from, middle), taken, halvings - 1)
+                + self.along(curve, (middle, to), taken, halvings - 1);
         }
         let half = (to - from) / 2.0;
-        let parts = rule(self.gloss.is_fine).iter();
+        let is_short = length < SHORT * scale && taken == Taken::AllAround;
+        let parts = rule(self.gloss.is_fine, is_short).iter();
         parts
-            .map(|(node, weight)| weight * half * self.turn(curve.at(middle + half * node), is_far))
+            .map(|(node, weight)| weight * half * self.turn(curve.at(middle + half * node), taken))
             .sum()
     }
 
     /// What a step along a curve brings.
-    fn turn(&self, (at, goes): (DVec3, DVec3), is_far: bool) -> f64 {
+    fn turn(&self, (at, goes): (DVec3, DVec3), taken: Taken) -> f64 {
         let square = at.length_squared();
         let towards = at / libm::sqrt(square);
         let cos = self.mirror.dot(towards);
@@ -245,35 +276,37 @@ impl Lobe<'_> {
         if sin <= f64::EPSILON {
             return 0.5 * self.rise * turned;
         }
-        let (cone, aside) = if is_far {
+        let (cone, aside) = if taken == Taken::Within {
+            self.gloss.moments.within(sin, cos)
+        } else {
             let (cone, aside) = self.gloss.moments.beyond(sin, cos);
             (-cone, -aside)
-        } else {
-            self.gloss.moments.within(sin, cos)
         };
         let across = (self.normal.dot(towards) - cos * self.rise) / sin;
         (cone * self.rise + aside * across) * turned / sin_square
     }
+}
 
-    /// How far it is in a direction, if it is there.
-    fn distance(&self, sight: &Sight, towards: DVec3) -> Option<f64> {
-        match sight {
-            Sight::Body(solid) => solid.last_hit(self.place, towards, (0.0, f64::INFINITY)),
-            Sight::Cap(centre, half) => {
+impl Sight {
+    /// How far it is from a place in a direction, if it is there.
+    pub(super) fn distance(&self, place: DVec3, towards: DVec3) -> Option<f64> {
+        match self {
+            Self::Body(solid) => solid.last_hit(place, towards, (0.0, f64::INFINITY)),
+            Self::Cap(centre, half) => {
                 let is_inside = towards.distance(*centre) <= 2.0 * libm::sin(half / 2.0);
                 is_inside.then_some(f64::INFINITY)
             }
         }
     }
 
-    /// Directions that hold it: their middle and half of what they subtend. `None` of a half-plane, and
-    /// where a ball about it holds the place too: it may be anywhere.
-    fn cone(&self, sight: &Sight) -> Option<(DVec3, f64)> {
-        match sight {
-            Sight::Cap(centre, half) => Some((*centre, *half)),
-            Sight::Body(solid) => {
+    /// Directions from a place that hold it: their middle and half of what they subtend. `None` of a
+    /// half-plane, and where a ball about it holds the place too: it may be anywhere.
+    pub(super) fn cone(&self, place: DVec3) -> Option<(DVec3, f64)> {
+        match self {
+            Self::Cap(centre, half) => Some((*centre, *half)),
+            Self::Body(solid) => {
                 let (centre, radius_m) = solid.bounding_ball()?;
-                let away = centre - self.place;
+                let away = centre - place;
                 let part = radius_m / away.length();
                 (part < 1.0).then(|| (away / away.length(), libm::asin(part)))
             }
@@ -282,8 +315,13 @@ impl Lobe<'_> {
 }
 
 /// Nodes in (-1, 1) and weights.
-fn rule(is_fine: bool) -> &'static [(f64, f64)] {
-    static RULES: [OnceLock<Vec<(f64, f64)>>; 2] = [const { OnceLock::new() }; 2];
-    let nodes = if is_fine { FINER } else { NODES };
-    RULES[usize::from(is_fine)].get_or_init(|| gauss_legendre(nodes))
+fn rule(is_fine: bool, is_short: bool) -> &'static [(f64, f64)] {
+    static RULES: [OnceLock<Vec<(f64, f64)>>; 4] = [const { OnceLock::new() }; 4];
+    let nodes = match (is_fine, is_short) {
+        (false, false) => NODES,
+        (true, false) => FINER,
+        (false, true) => FEW,
+        (true, true) => 2 * FEW,
+    };
+    RULES[2 * usize::from(is_short) + usize::from(is_fine)].get_or_init(|| gauss_legendre(nodes))
 }

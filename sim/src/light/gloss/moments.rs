@@ -66,7 +66,6 @@ impl Moments {
     }
 
     /// n.
-    #[cfg(test)]
     pub(super) const fn exponent(&self) -> f64 {
         self.exponent
     }

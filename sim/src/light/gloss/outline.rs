@@ -15,7 +15,7 @@ const HALVINGS: u32 = 48;
 
 /// Directions, not of length one, over a parameter.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Curve {
+pub(in crate::light) enum Curve {
     /// a + t b, t from 0 to 1.
     Segment(DVec3, DVec3),
     /// a + b cos t + c sin t, t from 0 to 2π.
@@ -24,18 +24,40 @@ pub(super) enum Curve {
 
 /// What is 0 along an outline, and perhaps elsewhere.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Level {
+pub(in crate::light) enum Level {
     /// n·d.
     Plane(DVec3),
     /// d·Md.
     Cone(DMat3),
+    /// u·d - |d| cos: directions at an angle from a unit vector.
+    Round(DVec3, f64),
 }
+
+impl Level {
+    /// At an angle from a vector or from its opposite.
+    fn both_ways(towards: DVec3, cos: f64) -> Self {
+        // Of a cone as flat as this the two nappes are one plane, which is crossed but once.
+        if cos.abs() < LEVEL {
+            return Self::Plane(towards);
+        }
+        let along = DMat3::from_cols(towards * towards.x, towards * towards.y, towards * towards.z);
+        Self::Cone(along - DMat3::IDENTITY * (cos * cos))
+    }
+}
+
+/// Rounding of products of unit vectors.
+const LEVEL: f64 = 1e-14;
 
 impl Curve {
     /// All directions across another.
     pub(super) fn great_circle(normal: DVec3) -> Self {
         let (e, f) = frame(normal);
         Self::Circle(DVec3::ZERO, e, f)
+    }
+
+    /// A circle about z, t being φ.
+    pub(in crate::light) fn parallel(sin: f64, cos: f64) -> Self {
+        Self::Circle(DVec3::Z * cos, DVec3::X * sin, DVec3::Y * sin)
     }
 
     pub(super) const fn range(&self) -> (f64, f64) {
@@ -65,10 +87,13 @@ impl Curve {
     }
 
     /// Where it crosses an outline.
-    pub(super) fn crossings(&self, level: &Level, found: &mut Vec<f64>) {
+    pub(in crate::light) fn crossings(&self, level: &Level, found: &mut Vec<f64>) {
         match (self, level) {
             (Self::Segment(a, b), Level::Plane(normal)) => {
                 found.push(-normal.dot(*a) / normal.dot(*b));
+            }
+            (Self::Segment(..), Level::Round(towards, cos)) => {
+                self.crossings(&Level::both_ways(*towards, *cos), found);
             }
             (Self::Segment(a, b), Level::Cone(matrix)) => {
                 let (square, middle) = (b.dot(*matrix * *b), -a.dot(*matrix * *b));
@@ -80,6 +105,20 @@ impl Curve {
             }
             (Self::Circle(a, b, c), Level::Plane(normal)) => {
                 let (rest, e, f) = (-normal.dot(*a), normal.dot(*b), normal.dot(*c));
+                let wide = libm::hypot(e, f);
+                if wide > rest.abs() {
+                    let (turn, aside) = (libm::atan2(f, e), libm::acos(rest / wide));
+                    found.extend([turn - aside, turn + aside].map(|t| t - TAU * (t / TAU).floor()));
+                }
+            }
+            (Self::Circle(a, b, c), Level::Round(towards, cos)) => {
+                let is_even = a.dot(*b).abs() + a.dot(*c).abs() + b.dot(*c).abs() < LEVEL
+                    && (b.length_squared() - c.length_squared()).abs() < LEVEL
+                    && (a.length_squared() + b.length_squared() - 1.0).abs() < LEVEL;
+                if !is_even {
+                    return self.crossings(&Level::both_ways(*towards, *cos), found);
+                }
+                let (rest, e, f) = (cos - towards.dot(*a), towards.dot(*b), towards.dot(*c));
                 let wide = libm::hypot(e, f);
                 if wide > rest.abs() {
                     let (turn, aside) = (libm::atan2(f, e), libm::acos(rest / wide));
@@ -133,18 +172,14 @@ impl Sight {
     }
 
     /// What is 0 along its outline.
-    pub(super) fn levels(&self, place: DVec3) -> Vec<Level> {
-        let cone = |towards: DVec3, square: f64| {
-            let across =
-                DMat3::from_cols(towards * towards.x, towards * towards.y, towards * towards.z);
-            vec![Level::Cone(across - DMat3::IDENTITY * square)]
-        };
+    pub(in crate::light) fn levels(&self, place: DVec3) -> Vec<Level> {
         match self {
-            Self::Cap(towards, half) => cone(*towards, libm::cos(*half).powi(2)),
+            Self::Cap(towards, half) => vec![Level::Round(*towards, libm::cos(*half))],
             Self::Body(Solid::Sphere(ball)) => {
                 let away = ball.center_m() - place;
                 let sin = (ball.radius_m() / away.length()).min(1.0);
-                cone(normalised(away).unwrap_or(DVec3::Z), 1.0 - sin * sin)
+                let towards = normalised(away).unwrap_or(DVec3::Z);
+                vec![Level::Round(towards, libm::sqrt(1.0 - sin * sin))]
             }
             Self::Body(Solid::Disk(disk)) => {
                 let (c, n) = (disk.center_m() - place, normalised(disk.axis()).unwrap_or(DVec3::Z));

@@ -7,6 +7,7 @@ use radiometry::direction::frame;
 use radiometry::shape::{Disk, HalfPlane, Polygon, Sphere};
 
 use super::*;
+use crate::scene::Image;
 
 const GLOSS: f64 = 0.4;
 
@@ -108,7 +109,7 @@ fn by_directions(of: &Gloss, into: DVec3, source: &Sight, before: &[Sight]) -> f
     const ROOT: f64 = 1.324_717_957_244_746;
     let lobe = of.lobe(DVec3::new(0.1, -0.05, 0.0), DVec3::Z, into.normalize());
     let n = of.moments.exponent();
-    let (source_axis, half) = lobe.cone(source).unwrap();
+    let (source_axis, half) = source.cone(lobe.place).unwrap();
     let (axis, solid_angle) = if n > NARROW {
         (lobe.mirror, TAU / (n + 1.0))
     } else {
@@ -126,10 +127,10 @@ fn by_directions(of: &Gloss, into: DVec3, source: &Sight, before: &[Sight]) -> f
         };
         let (sin, turn) = ((1.0 - cos * cos).sqrt(), TAU * part(1.0 / (ROOT * ROOT)));
         let towards = axis * cos + (e * turn.cos() + f * turn.sin()) * sin;
-        let Some(far) = lobe.distance(source, towards).filter(|_| towards.z > 0.0) else {
+        let Some(far) = source.distance(lobe.place, towards).filter(|_| towards.z > 0.0) else {
             continue;
         };
-        if !before.iter().any(|b| lobe.distance(b, towards).is_some_and(|near| near < far)) {
+        if !before.iter().any(|b| b.distance(lobe.place, towards).is_some_and(|near| near < far)) {
             let bright = bright.map_or(1.0, |n| lobe.mirror.dot(towards).max(0.0).powf(n));
             sum += bright * towards.z;
         }
@@ -194,4 +195,117 @@ fn a_lamp_far_from_the_mirror_direction_is_seen_in_the_tail_without_loss() {
     let found = radiance(&glossy(30.0), DVec3::ZERO, into, &Sight::Cap(towards, half), &[]);
     let expected = GLOSS * 32.0 / TAU * 0.5f64.powi(30) * 0.5 * PI * half * half;
     assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
+}
+
+fn sky(columns: usize, values: &[f64]) -> Surrounding {
+    Surrounding::new(&Image::new(columns, values.to_vec()).unwrap())
+}
+
+fn of_sky(of: &Gloss, (place, normal, into): (DVec3, DVec3, DVec3), before: &[Sight]) -> [f64; 2] {
+    let map = sky(
+        5,
+        &[
+            4.0, 1.0, 0.0, 9.0, 2.0, 1.0, 0.0, 3.0, 5.0, 5.0, 2.0, 8.0, 0.0, 1.0, 6.0, 7.0, 7.0,
+            0.0, 2.0, 1.0,
+        ],
+    );
+    let lobe = of.lobe(place, normal.normalize(), into.normalize());
+    [Counts::Seen, Counts::Hidden].map(|counts| lobe.of_surrounding(&map, before, counts))
+}
+
+#[test]
+fn a_surrounding_that_is_white_all_over_is_a_white_sky() {
+    let (white, cap) = (sky(3, &[1.0; 6]), Sight::Cap(DVec3::Z, FRAC_PI_2));
+    // Half white and half next to it: every border is there, and steps by next to nothing.
+    let checkered: Vec<f64> = (0..48).map(|i| if i % 2 == 0 { 1.0 } else { 1.0 + 1e-9 }).collect();
+    let checkered = sky(8, &checkered);
+    for exponent in [0.0, 1.0, 7.5, 400.0, 20_000.0] {
+        for theta in [0.0, 45.0, 85.0, 89.9_f64] {
+            let (sin, cos) = theta.to_radians().sin_cos();
+            let of = glossy(exponent);
+            let lobe = of.lobe(DVec3::ZERO, DVec3::Z, DVec3::new(sin, 0.0, cos));
+            let expected = lobe.radiance(&cap, &[]);
+            for map in [&white, &checkered] {
+                let found = lobe.of_surrounding(map, &[], Counts::Seen);
+                let off = (found - expected).abs();
+                assert!(off < 3e-8, "{found} {expected}, {exponent} {theta}°");
+            }
+        }
+    }
+}
+
+#[test]
+fn of_a_surrounding_is_sent_on_what_a_sum_over_directions_says() {
+    let bodies = [
+        sphere([0.1, 0.2, 0.5], 0.3),
+        polygon(&[[-0.2, -0.9, 0.1], [0.6, -0.2, 0.5], [-0.05, 0.3, 0.4]]),
+        disk([0.4, -0.3, 0.0], [1.0, 0.1, 0.1], 0.3),
+        Sight::Body(Solid::HalfPlane(HalfPlane::new(-0.2, 0.35).unwrap())),
+    ];
+    let place = DVec3::new(0.05, -0.05, 0.0);
+    let map = [
+        4.0, 1.0, 0.0, 9.0, 2.0, 1.0, 0.0, 3.0, 5.0, 5.0, 2.0, 8.0, 0.0, 1.0, 6.0, 7.0, 7.0, 0.0,
+        2.0, 1.0,
+    ];
+    for exponent in [0.0, 3.0, 60.0] {
+        let of = glossy(exponent);
+        for (i, (normal, into)) in [
+            (DVec3::Z, DVec3::Z),
+            (DVec3::Z, DVec3::new(1.0, 0.0, 1.0)),
+            (DVec3::new(0.3, -0.5, 0.7), DVec3::new(0.1, 0.4, 1.0)),
+            (DVec3::new(0.9, 0.2, 0.1), DVec3::new(1.0, 0.8, 0.3)),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            for before in [&bodies[..0], &bodies[i..][..1], &bodies[i % 3..][..2]] {
+                let [seen, hidden] = of_sky(&of, (place, normal, into), before);
+                let lobe = of.lobe(place, normal.normalize(), into.normalize());
+                // All directions evenly, by Fibonacci's spiral.
+                let count = 400_000;
+                let mut sums = [0.0; 2];
+                for k in 0..count {
+                    let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+                    let turn = f64::from(k) * 2.399_963_229_728_653;
+                    let root = (1.0 - z * z).sqrt();
+                    let towards = DVec3::new(root * turn.cos(), root * turn.sin(), z);
+                    let rise = lobe.normal.dot(towards);
+                    let cos = lobe.mirror.dot(towards);
+                    if rise <= 0.0 || cos <= 0.0 {
+                        continue;
+                    }
+                    let (row, column) =
+                        (z.acos() / PI * 4.0, towards.y.atan2(towards.x) / TAU + 0.5);
+                    let radiance =
+                        map[(row as usize).min(3) * 5 + ((column * 5.0) as usize).min(4)];
+                    let is_hidden =
+                        before.iter().any(|b| b.distance(lobe.place, towards).is_some());
+                    sums[usize::from(is_hidden)] += radiance * cos.powf(exponent) * rise;
+                }
+                let scale = of.factor * 4.0 * PI / f64::from(count);
+                let what = format!("{exponent} {i} {}", before.len());
+                for (found, sum) in [(seen, sums[0]), (hidden, sums[1])] {
+                    assert!((found - sum * scale).abs() < 5e-3, "{what}: {found} {}", sum * scale);
+                }
+                let finer = of_sky(&of.finer(), (place, normal, into), before);
+                assert!((finer[0] - seen).abs() < 1e-6, "{what}: {seen} {finer:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_hidden_of_a_surrounding_and_what_is_left_are_all_of_it() {
+    let body = sphere([0.3, -0.2, 0.4], 0.25);
+    for exponent in [0.0, 5.0, 300.0] {
+        for into in [DVec3::new(-0.3, 0.2, 0.4), DVec3::new(0.5, 0.1, 0.8)] {
+            let at = (DVec3::ZERO, DVec3::new(0.1, 0.1, 1.0), into);
+            let [whole, none] = of_sky(&glossy(exponent), at, &[]);
+            let [seen, hidden] = of_sky(&glossy(exponent), at, std::slice::from_ref(&body));
+            assert!(
+                none == 0.0 && (seen + hidden - whole).abs() < 1e-7 * whole,
+                "{seen} {hidden} {whole}"
+            );
+        }
+    }
 }

@@ -18,8 +18,9 @@ use glam::DVec3;
 use radiometry::projected::{self, RegionShadow, Source as Shining};
 use radiometry::shape::Polygon;
 
-use super::lamps::{Lighting, position, region_of, shining};
+use super::lamps::{Lighting, region_of};
 use super::occluder_of;
+use super::source::{position, shining};
 use crate::CompileError;
 use crate::scene::{Body, Scene};
 use gather::{Between, gather};

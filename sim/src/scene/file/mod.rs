@@ -77,8 +77,7 @@ impl Scene {
             return Err(own.unwrap_or(&root).problem(
                 "kind",
                 &format!("not simulated: {what}"),
-                "a glossy surface that sees no other surface, no environment and no window of the \
-                 sample above it",
+                "a glossy surface that sees no other surface and no window of the sample above it",
                 "make it lambertian, or leave the other out",
             ));
         }
