@@ -235,6 +235,7 @@ fn a_surrounding_that_is_white_all_over_is_a_white_sky() {
 }
 
 #[test]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
 fn of_a_surrounding_is_sent_on_what_a_sum_over_directions_says() {
     let bodies = [
         sphere([0.1, 0.2, 0.5], 0.3),
