@@ -80,6 +80,41 @@ fn merged_shares_of_a_csv_are_the_fit_of_the_whole() {
 }
 
 #[test]
+fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
+    let bench = Bench::empty();
+    std::fs::write(bench.path("long.csv"), samples(0, 50_100, true)).unwrap();
+    let share = part(&bench, "long");
+    let share = bench.gonio(&["fit", "--merge", &share, "--json"]).well().json();
+    let whole = ["fit", "long.csv", "--angular-degree=4", "--position-degree=0", "--json"];
+    let whole = bench.gonio(&whole).well().json();
+    assert_eq!(
+        whole["notes"][1],
+        "read in blocks, no sample kept: what single ones did is not listed"
+    );
+    for key in ["coefficients", "covariance", "residual_rms", "n_used", "dof"] {
+        assert_close(&share[key], &whole[key], 1e-6);
+    }
+}
+
+#[test]
+fn a_share_is_looked_at_once_and_refuses_what_takes_more() {
+    let bench = bench();
+    for (flags, said) in [
+        (["--robust", "tukey"], "--partial: robust: "),
+        (["--symmetry", "rotational"], "--partial: symmetry: "),
+        (["--drift", "yes"], "--partial: drift: "),
+    ] {
+        let arguments = [&["fit", "a.csv", "-o", "no.bin"], &flags[..], &REGION[..]].concat();
+        bench.gonio(&arguments).refused(&[said, "help: "]);
+    }
+    let twice = format!("{}{}", samples(0, 20, true), samples(3, 4, true).lines().last().unwrap());
+    std::fs::write(bench.path("twice.csv"), twice).unwrap();
+    bench
+        .gonio(&["fit", "twice.csv"])
+        .refused(&["line 22 repeats line 5 in every field", "help: "]);
+}
+
+#[test]
 fn a_run_is_a_share_too() {
     let bench = Bench::small();
     bench.gonio(&["run", "plan.toml", "--out", "out"]).well();

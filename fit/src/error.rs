@@ -128,6 +128,23 @@ pub enum FitError {
         /// The component.
         name: String,
     },
+    /// All samples lie along one ray, and no basis is named: nothing tells how the field changes. Measure
+    /// other poses, or say that it is constant.
+    OnePose {
+        /// Samples handed in.
+        readings: usize,
+        /// Their angle from the normal, radians.
+        theta_rad: f64,
+        /// Their azimuth, radians.
+        phi_rad: f64,
+    },
+    /// Something was to be fitted along that the readings know nothing of.
+    Nuisance {
+        /// What.
+        name: &'static str,
+        /// What is missing.
+        missing: &'static str,
+    },
     /// The numbers are so large or so small that squares leave the range of f64.
     OutOfRange,
     /// Stored parts of a fit don't belong together.
@@ -184,11 +201,7 @@ impl fmt::Display for FitError {
             Self::Truncation { truncation } => {
                 write!(f, "truncation {truncation}: expected a finite number of 0 or more")
             }
-            Self::Penalty { penalty: Penalty { power, strength } } => write!(
-                f,
-                "penalty of power {power} and strength {strength}: expected a finite strength of 0 \
-                 or more and a power of 0 to 8 (of splines 1 or 2)"
-            ),
+            Self::Penalty { penalty } => unsound_penalty(f, penalty),
             Self::NotFinite { index, what } => write!(f, "sample {index}: {what} is not finite"),
             Self::Variance { index, what, value } => {
                 write!(f, "sample {index}: {what} {value:e}, expected more than 0")
@@ -218,12 +231,39 @@ impl fmt::Display for FitError {
             Self::Common { name } => {
                 write!(f, "common component `{name}`: u or its shift is negative or not finite")
             }
+            Self::OnePose { readings, theta_rad, phi_rad } => {
+                one_pose(f, *readings, theta_rad.to_degrees(), phi_rad.to_degrees())
+            }
+            Self::Nuisance { name, missing } => write!(f, "{name} can't be fitted: {missing}"),
             Self::OutOfRange => f.write_str("values or variances leave the range of numbers"),
             Self::Parts { what, expected, found } => {
                 write!(f, "stored fit: {what}: expected {expected} finite numbers, found {found}")
             }
         }
     }
+}
+
+fn unsound_penalty(f: &mut fmt::Formatter<'_>, penalty: &Penalty) -> fmt::Result {
+    let Penalty { power, strength } = penalty;
+    write!(
+        f,
+        "penalty of power {power} and strength {strength}: expected a finite strength of 0 or more \
+         and a power of 0 to 8 (of splines 1 or 2)"
+    )
+}
+
+fn one_pose(
+    f: &mut fmt::Formatter<'_>,
+    readings: usize,
+    theta_deg: f64,
+    phi_deg: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "all {readings} readings are of one pose (theta {theta_deg:.3}°, phi {phi_deg:.3}°), which \
+         tells nothing of other directions and places; a field that is the same everywhere is degree 0 \
+         in both"
+    )
 }
 
 fn undetermined(

@@ -89,6 +89,25 @@ impl std::fmt::Display for SymmetryError {
 impl std::error::Error for SymmetryError {}
 
 impl Symmetry {
+    /// All of them, mirrors at this azimuth.
+    pub const fn all_at(phi_rad: f64) -> [Self; 3] {
+        [Self::Rotational, Self::Quadrant { phi_rad }, Self::Plane { phi_rad }]
+    }
+
+    /// As plans write it.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Rotational => "rotational",
+            Self::Quadrant { .. } => "quadrant",
+            Self::Plane { .. } => "plane",
+        }
+    }
+
+    /// Whether it has mirrors, which stand at an azimuth.
+    pub const fn has_azimuth(self) -> bool {
+        !matches!(self, Self::Rotational)
+    }
+
     /// In words.
     pub const fn name(self) -> &'static str {
         match self {

@@ -207,3 +207,20 @@ fn a_dark_field_of_zeros_is_a_fit_like_any_other() {
     assert!(field.exitance().value.abs() < 1e-12);
     assert_eq!(field.measured_fraction(), None);
 }
+
+#[test]
+fn one_pose_tells_no_field_unless_it_is_said_to_be_constant() {
+    let ray = Ray { x_m: 0.0, y_m: 0.015, theta_rad: 0.2, phi_rad: 1.0 };
+    let mut die = Die::new(3);
+    let noise = Noise::Fixed { variance: 0.01 };
+    let samples: Vec<Sample> =
+        (0..40).map(|_| Sample { ray, value: 5.0 + 0.1 * die.normal(), noise }).collect();
+    let chosen =
+        |wish: fit::Wish| fit::fit_wished(&fit::Readings::of(&samples), &REGION, &wish, None);
+    let refused = chosen(fit::Wish::default()).unwrap_err().to_string();
+    says(&refused, "all 40 readings are of one pose (theta 11.459°, phi 57.296°)");
+    let constant =
+        fit::Wish { angular_degree: Some(0), position_degree: Some(0), ..fit::Wish::default() };
+    let fit = chosen(constant).unwrap().fit;
+    assert!((fit.value(&ray) - 5.0).abs() < 0.1);
+}

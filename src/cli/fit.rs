@@ -4,10 +4,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{AngularKind, Optics, Region, Resolves, Wish};
+use fit::{
+    AngularKind, Optics, Penalised, Readings, Region, Resolves, Robust, Rules, Symmetry, Wish,
+};
 
 use super::args::FitArgs;
-use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
@@ -16,11 +17,12 @@ use super::partial;
 use super::picture;
 use super::results::{Results, read_run};
 use super::setup::rig_at;
-use super::summary::{field_rows, model_rows};
+use super::stream::{self, Scan};
+use super::summary::{field_rows, model_rows, treatment_rows};
 use super::text::{row, table};
 use crate::export::{
-    FitFile, InputSamples, ListedRay, RayChart, read_rays, read_samples_in, write_at,
-    write_atomically,
+    FitFile, InputSample, ListedRay, RayChart, Treatment, read_rays, write_at, write_atomically,
+    write_weights,
 };
 use crate::plan::Wanted;
 
@@ -86,6 +88,48 @@ pub(super) fn wished(args: &FitArgs, plan: Wish) -> Result<Wish, Failure> {
         position_degree: args.position_degree.or(base.position_degree),
         penalty_power: args.penalty_power.or(base.penalty_power),
         penalty_strength: args.penalty_strength.or(base.penalty_strength),
+        rules: rules(args, plan.rules)?,
+    })
+}
+
+/// What holds beyond the basis, by the command line, and where it is silent the plan.
+fn rules(args: &FitArgs, plan: Rules) -> Result<Rules, Failure> {
+    let unknown = |flag: &str, name: &str, known: String| {
+        Failure::with_help(format!("{flag}: `{name}` is not known"), format!("expected {known}"))
+    };
+    let robust = match &args.robust {
+        None => plan.robust,
+        Some(name) => Robust::ALL
+            .into_iter()
+            .find(|robust| robust.name() == name)
+            .ok_or_else(|| unknown("--robust", name, Robust::ALL.map(Robust::name).join(", ")))?,
+    };
+    let phi_deg = args.symmetry_phi_deg.unwrap_or(0.0);
+    if !phi_deg.is_finite() {
+        return Err(Failure::start("--symmetry-phi-deg: expected a finite angle"));
+    }
+    let known = Symmetry::all_at(phi_deg.to_radians());
+    let symmetry = match &args.symmetry {
+        None => plan.symmetry,
+        Some(name) => Some(
+            known
+                .into_iter()
+                .find(|symmetry| symmetry.key() == name)
+                .ok_or_else(|| unknown("--symmetry", name, known.map(Symmetry::key).join(", ")))?,
+        ),
+    };
+    if args.symmetry_phi_deg.is_some() && !symmetry.is_some_and(Symmetry::has_azimuth) {
+        return Err(Failure::with_help(
+            "--symmetry-phi-deg: rotational symmetry has no mirror",
+            "leave it out, or ask for --symmetry plane or quadrant",
+        ));
+    }
+    Ok(Rules {
+        robust,
+        nonnegative: args.nonnegative || plan.nonnegative,
+        symmetry,
+        drift: args.drift.or(plan.drift),
+        ranges: plan.ranges,
     })
 }
 
@@ -130,8 +174,10 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
     results.write_fit(&path, &setup, fitted).map_err(Failure::midway)?;
     derive::write_tables(beside(&path), &results.derived).map_err(Failure::midway)?;
+    let treatment = results.treatment(fitted);
     let file = FitFile {
         fit: &fitted.fit,
+        treatment: &treatment,
         choice: fitted.choice.as_ref(),
         resolves: Some(fitted.resolves),
         quantity: setup.rig.detector.quantity,
@@ -148,33 +194,48 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
 
 fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
     let shown = args.source.display();
-    let bytes = read_csv(&args.source)?;
     let chart = args.chart.ray_chart()?;
-    let input = read_samples_in(chart, &bytes)
-        .map_err(|error| Failure::with_help(format!("{shown}: {error}"), csv_help(chart)))?;
     if let Some(u) = args.u_relative
         && !(u > 0.0 && u.is_finite())
     {
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
     let common = scale_of(args)?;
-    let region = args.chart.region(chart, &input.samples.iter().map(|sample| sample.ray.ray()));
     let wish = wished(args, Wish::default())?;
-    let samples = input.fit_samples(args.u_relative);
+    if wish.rules.drift == Some(true) {
+        return Err(Failure::with_help(
+            "--drift: a CSV has no reference readings",
+            "leave it out; it is for a run",
+        ));
+    }
     let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
+    let (scan, kept) = Scan::of(&args.source, &args.chart)?;
+    if kept.is_none()
+        && args.picture.is_none()
+        && args.u_scale.is_none()
+        && let Some(model) = scan.pinned(&wish)
+    {
+        return fit_stream(args, rays, wanted, (&scan, model, optics, &wish.rules));
+    }
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
-    let (model, choice) =
-        fit::choose(&samples, &region, &wish, optics.as_ref()).map_err(refused)?;
-    let fit = fit::fit_seen(&samples, &region, model, &common, optics.as_ref()).map_err(refused)?;
-    let resolves = Resolves::of(&samples, &region, model.basis, optics.as_ref());
-    let mut notes = vec![note_on_u(&input, args.u_relative)];
+    let input = kept.map_or_else(|| stream::all(&args.source, chart), Ok)?;
+    let region = args.chart.region(chart, &input.samples.iter().map(|sample| sample.ray.ray()));
+    let (samples, limits) = input.fit_readings(args.u_relative);
+    let readings = Readings { limits: &limits, common: &common, ..Readings::of(&samples) };
+    let ruled = fit::fit_wished(&readings, &region, &wish, optics.as_ref()).map_err(refused)?;
+    let fit = &ruled.fit;
+    let resolves = Resolves::of(&samples, &region, fit.basis(), optics.as_ref());
+    let mut notes = vec![note_on_u(input.has_u(), args.u_relative)];
     notes.extend(args.u_scale.map(|u| format!("all samples share a scale known to {u}, relative")));
-    let derived = derive::derive(&fit, input.quantity, wanted);
-    let folder = args.output.as_deref().map_or(Path::new(""), beside);
-    derive::write_tables(folder, &derived).map_err(Failure::midway)?;
+    let derived = derive::derive(fit, input.quantity, wanted);
+    let named = |sample: &InputSample| (sample.line, sample.ray.ray(), sample.value);
+    let used: Vec<_> = input.with_limits().map(named).collect();
+    let treatment = Treatment::of(fit, |i| used[i], input.left_out().map(named))
+        .with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
     let file = FitFile {
-        fit: &fit,
-        choice: choice.as_ref(),
+        fit,
+        treatment: &treatment,
+        choice: ruled.choice.as_ref(),
         resolves: Some(resolves),
         quantity: input.quantity,
         simulated: false,
@@ -185,13 +246,10 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         independent: &[],
         derived: &derived,
     };
-    if let Some(path) = &args.output {
-        write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
-    }
     if let Some(path) = &args.picture {
-        picture::write(path, &fit, input.quantity, &samples)?;
+        picture::write(path, fit, input.quantity, &samples)?;
     }
-    show(args, rays, &file, args.output.as_deref())
+    write_and_show(args, rays, &file)
 }
 
 /// What all samples of a CSV share.
@@ -203,8 +261,58 @@ fn scale_of(args: &FitArgs) -> Result<Vec<fit::Common>, Failure> {
     Ok(vec![fit::Common { name: "scale".to_owned(), u, shift: fit::Shift::Scale }])
 }
 
-fn note_on_u(input: &InputSamples, u_relative: Option<f64>) -> String {
-    match (input.has_u(), u_relative) {
+/// A long file in a basis that is pinned.
+fn fit_stream(
+    args: &FitArgs,
+    rays: Option<Vec<ListedRay>>,
+    wanted: &[Wanted],
+    (scan, model, optics, rules): (&Scan, Penalised, Option<Optics>, &Rules),
+) -> Outcome {
+    let closed = scan.fit(&args.source, model, optics, args.u_relative)?;
+    let ruled = closed.fit.ruled(rules).map_err(|error| {
+        Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
+    })?;
+    let notes = [
+        note_on_u(scan.has_u, args.u_relative),
+        "read in blocks, no sample kept: what single ones did is not listed".to_owned(),
+    ];
+    let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
+    let treatment =
+        Treatment::default().with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
+    let file = FitFile {
+        fit: &ruled.fit,
+        treatment: &treatment,
+        choice: None,
+        resolves: None,
+        quantity: scan.quantity,
+        simulated: false,
+        n_flagged: scan.flagged,
+        n_excluded: scan.samples - scan.used,
+        notes: &notes,
+        truth: None,
+        independent: &[],
+        derived: &derived,
+    };
+    write_and_show(args, rays, &file)
+}
+
+fn write_and_show(args: &FitArgs, rays: Option<Vec<ListedRay>>, file: &FitFile<'_>) -> Outcome {
+    let folder = args.output.as_deref().map_or(Path::new(""), beside);
+    derive::write_tables(folder, file.derived).map_err(Failure::midway)?;
+    if let Some(path) = &args.output {
+        write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+        if file.treatment.is_long() {
+            write_atomically(&folder.join("weights.csv"), |out| {
+                write_weights(out, file.quantity, file.treatment)
+            })
+            .map_err(Failure::midway)?;
+        }
+    }
+    show(args, rays, file, args.output.as_deref())
+}
+
+fn note_on_u(has_u: bool, u_relative: Option<f64>) -> String {
+    match (has_u, u_relative) {
         (true, _) => {
             "the input's uncertainties count as independent from sample to sample".to_owned()
         }
@@ -269,6 +377,10 @@ pub(super) fn show(
             note(&format!("{}, {}: {why}", quantity.name, quantity.asked));
         }
     }
+    if let Some(Err(why)) = file.treatment.symmetry() {
+        is_whole = false;
+        note(&format!("symmetry not used: {why}"));
+    }
     Ok(if is_whole { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
@@ -296,6 +408,7 @@ fn summary(args: &FitArgs, file: &FitFile<'_>, written: Option<&Path>) -> String
         row("condition", format!("{:.1}", fit.condition())),
     ];
     rows.extend(model_rows(fit, file.choice, file.resolves));
+    rows.extend(treatment_rows(file.treatment, file.quantity));
     rows.extend(field_rows(fit, file.quantity));
     rows.extend(derive::rows(file.derived, file.quantity));
     rows.extend(file.notes.iter().map(|note| row("note", note)));

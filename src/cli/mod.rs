@@ -34,6 +34,7 @@ mod setup;
 mod shop;
 mod simulated;
 mod stopping;
+mod stream;
 mod study;
 mod summary;
 mod target;

@@ -7,23 +7,23 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use fit::partial::{Accumulator, Partial, Weighting};
-use fit::{Optics, Penalised, Region, Wish};
+use fit::{Optics, Penalised, Region, Robust, Rules, Wish};
 
 use super::args::FitArgs;
 use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::fit::{FIT_HELP, beside, optics_of, show, wished};
-use super::output::say;
+use super::output::{note, say};
 use super::results::{fit_region, optics, read_run};
 use super::text::{row, table};
 use crate::export::{
-    BlockError, FitFile, InputSamples, ListedRay, PartialFile, ReadPartial, read_sample_blocks,
-    write_atomically,
+    BlockError, FitFile, InputSamples, ListedRay, PartialFile, ReadPartial, Treatment,
+    read_sample_blocks, write_atomically,
 };
 use crate::plan::Wanted;
 use crate::rig::Quantity;
-use crate::rig::calibration::calibrate;
+use crate::rig::calibration::{FittedDrift, calibrate};
 
 /// A partial fit of 4,096 coefficients and dozens of common components is far below.
 const PARTIAL_BYTES_MAX: u64 = 1 << 30;
@@ -57,9 +57,14 @@ fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
     args.chart.demand_none()?;
     let (setup, _, readings) = read_run(&args.source)?;
     let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
-    let model = decided(wished(args, setup.plan.fit)?)?;
+    let wish = wished(args, setup.plan.fit)?;
+    needs_one_look(&wish.rules)?;
+    if FittedDrift::of(&calibrated.references, false).is_some() {
+        note("note: the reference readings show a drift, which a share does not fit along");
+    }
+    let model = decided(wish)?;
     let (region, optics) = (fit_region(&setup), optics(&setup));
-    let input = calibrated.fit_input();
+    let input = calibrated.share_input();
     let partial = Partial::of(&input.samples, &region, model, &input.common, optics.as_ref())
         .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
     let flagged = calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count();
@@ -73,6 +78,25 @@ fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
     })
 }
 
+/// A share is looked at once, and its readings are then forgotten.
+fn needs_one_look(rules: &Rules) -> Result<(), Failure> {
+    let asked = [
+        ("robust", rules.robust != Robust::None, "what is an outlier only all readings tell"),
+        ("nonnegative", rules.nonnegative, "the field of all readings is held above zero"),
+        ("symmetry", rules.symmetry.is_some(), "all readings together bear it or don't"),
+        ("drift", rules.drift == Some(true), "it is fitted along with the whole field"),
+        ("ranges", rules.ranges == Some(true), "they are fitted along with the whole field"),
+    ];
+    let Some((key, _, why)) = asked.into_iter().find(|(_, is_asked, _)| *is_asked) else {
+        return Ok(());
+    };
+    let help = match key {
+        "nonnegative" | "symmetry" => "give it to --merge",
+        _ => "leave it out of the plan's [fit] and of the command, or fit the readings as a whole",
+    };
+    Err(Failure::with_help(format!("--partial: {key}: {why}"), help))
+}
+
 /// The one model that all shares are fitted with: none of them may choose for itself.
 fn decided(wish: Wish) -> Result<Penalised, Failure> {
     wish.decided().ok_or_else(|| {
@@ -84,6 +108,10 @@ fn decided(wish: Wish) -> Result<Penalised, Failure> {
     })
 }
 
+/// None asked for.
+const NO_RULES: Rules =
+    Rules { robust: Robust::None, nonnegative: false, symmetry: None, drift: None, ranges: None };
+
 /// What a share of a CSV is fitted with where the command line is silent.
 const DEGREES: Wish = Wish {
     kind: None,
@@ -91,6 +119,7 @@ const DEGREES: Wish = Wish {
     position_degree: Some(0),
     penalty_power: None,
     penalty_strength: None,
+    rules: NO_RULES,
 };
 
 /// A CSV, read in blocks: memory doesn't grow with its length.
@@ -110,9 +139,11 @@ fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
         return Err(Failure::with_help("--partial of a CSV: no region", REGION_HELP));
     };
     let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
+    let wish = wished(args, DEGREES)?;
+    needs_one_look(&wish.rules)?;
     let mut share = Share {
         region,
-        model: decided(wished(args, DEGREES)?.in_chart(&region.chart))?,
+        model: decided(wish.in_chart(&region.chart))?,
         optics: optics.as_ref(),
         begun: None,
         n_flagged: 0,
@@ -194,11 +225,19 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
             closed.u_factor
         ));
     }
-    let derived = derive::derive(&closed.fit, first.quantity, wanted);
+    let rules = wished(args, Wish::default())?.rules;
+    let ruled = closed
+        .fit
+        .ruled(&rules)
+        .map_err(|error| Failure::with_help(format!("merged: {error}"), FIT_HELP))?;
+    let treatment =
+        Treatment::default().with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
+    let derived = derive::derive(&ruled.fit, first.quantity, wanted);
     let folder = args.output.as_deref().map_or(Path::new(""), beside);
     derive::write_tables(folder, &derived).map_err(Failure::midway)?;
     let file = FitFile {
-        fit: &closed.fit,
+        fit: &ruled.fit,
+        treatment: &treatment,
         choice: None,
         resolves: None,
         quantity: first.quantity,

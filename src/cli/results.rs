@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{Contribution, Fit, FitError, Optics, Region, Wish};
+use fit::{Contribution, Fit, FitError, Optics, Region, Rules, Wish};
 
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
@@ -12,12 +12,12 @@ use super::folder::JOURNAL;
 use super::report::{self, REPORT, RunRecord};
 use super::setup::Setup;
 use crate::export::{
-    AccuracyPoint, DerivedQuantity, ExportError, FitFile, SamplesMeta, TruePeak, Truth,
-    write_accuracy, write_atomically, write_readings, write_samples,
+    AccuracyPoint, DerivedQuantity, ExportError, FitFile, SamplesMeta, Treatment, TruePeak, Truth,
+    write_accuracy, write_atomically, write_readings, write_samples, write_weights,
 };
 use crate::journal::{Header, InputRole, Order, Reader};
 use crate::rig::Reading;
-use crate::rig::calibration::{Calibrated, Fitted, calibrate};
+use crate::rig::calibration::{Calibrated, Fitted, Part, Sample, calibrate};
 use crate::study::Score;
 
 /// Points of the accuracy curve at most: each is a fit of its own.
@@ -60,7 +60,9 @@ impl Results {
         }
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
         let (truth, score) = compared.unzip();
-        let course = |fitted: &Fitted| accuracy(&calibrated, &region, &fitted.fit, optics.as_ref());
+        let course = |fitted: &Fitted| {
+            accuracy(&calibrated, &region, &fitted.fit, &wish.rules, optics.as_ref())
+        };
         let accuracy = fitted.as_ref().map_or_else(|_| Vec::new(), course);
         let derived = fitted.as_ref().map_or_else(
             |_| Vec::new(),
@@ -68,7 +70,7 @@ impl Results {
         );
         let independent = fitted
             .as_ref()
-            .map_or_else(|_| Vec::new(), |fitted| calibrated.independent_budget(&fitted.fit));
+            .map_or_else(|_| Vec::new(), |fitted| calibrated.independent_budget(fitted));
         let score = score.flatten();
         Ok(Self { calibrated, fitted, truth, score, accuracy, levels, independent, derived })
     }
@@ -109,6 +111,12 @@ impl Results {
         if let Ok(fitted) = &self.fitted {
             self.write_fit(&folder.join("fit.json"), setup, fitted)?;
             write_tables(folder, &self.derived)?;
+            let treatment = self.treatment(fitted);
+            if treatment.is_long() {
+                write_atomically(&folder.join("weights.csv"), |out| {
+                    write_weights(out, quantity, &treatment)
+                })?;
+            }
         }
         let report = report::of(setup, self, record);
         write_atomically(&folder.join(REPORT), |out| report.write(out))
@@ -136,6 +144,16 @@ impl Results {
         write_atomically(path, |out| meta.write(out))
     }
 
+    /// What became of readings that are no plain ones.
+    pub(crate) fn treatment<'a>(&'a self, fitted: &'a Fitted) -> Treatment<'a> {
+        let samples = &self.calibrated.samples;
+        let named = |sample: &Sample| (u64::from(sample.reading), sample.ray(), sample.value);
+        let left_out = samples.iter().filter(|sample| sample.part() == Part::None).map(named);
+        Treatment::of(&fitted.fit, |i| named(&samples[fitted.places[i]]), left_out)
+            .with_rules(fitted.symmetry.as_ref(), fitted.nonnegative.as_ref())
+            .with_drift(fitted.drift.as_ref())
+    }
+
     /// Writes fit.json.
     pub(crate) fn write_fit(
         &self,
@@ -143,8 +161,10 @@ impl Results {
         setup: &Setup,
         fitted: &Fitted,
     ) -> Result<(), ExportError> {
+        let treatment = self.treatment(fitted);
         let file = FitFile {
             fit: &fitted.fit,
+            treatment: &treatment,
             choice: fitted.choice.as_ref(),
             resolves: Some(fitted.resolves),
             quantity: setup.rig.detector.quantity,
@@ -247,6 +267,7 @@ fn accuracy(
     calibrated: &Calibrated,
     region: &Region,
     whole: &Fit,
+    rules: &Rules,
     optics: Option<&Optics>,
 ) -> Vec<AccuracyPoint> {
     let model = whole.model();
@@ -268,8 +289,8 @@ fn accuracy(
         let is_point = |fit: &Fit| fit.condition() <= ACCURACY_CONDITION_MAX;
         let fit = if count == total {
             whole.clone()
-        } else if is_point(&known.fit_as(region, model, None).ok()?.fit) {
-            known.fit_as(region, model, optics).ok()?.fit
+        } else if is_point(&known.fit_as(region, model, rules, None).ok()?.fit) {
+            known.fit_as(region, model, rules, optics).ok()?.fit
         } else {
             return None;
         };

@@ -146,7 +146,7 @@ impl Target {
         let optics = self.optics.as_ref();
         match self.chosen {
             Some((model, at)) if self.targets / 2 < at => {
-                calibrated.fit_as(&self.region, model, optics).ok()
+                calibrated.fit_as(&self.region, model, &self.wish.rules, optics).ok()
             }
             _ => {
                 let fitted = calibrated.fit(&self.region, &self.wish, optics).ok()?;

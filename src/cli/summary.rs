@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use fit::{Angular, BasisSpec, BeamRows, Choice, Fit, Penalty, Position, Resolves, Width};
+use fit::{Angular, BasisSpec, BeamRows, Choice, Fit, Penalty, Position, Resolves, Robust, Width};
 use serde_json::{Value, json};
 
 use super::derive;
@@ -13,7 +13,7 @@ use super::results::{Results, targets_planned};
 use super::setup::Setup;
 use super::stopping;
 use super::text::{duration, percent, row, table, with_uncertainty};
-use crate::export::charted;
+use crate::export::{Treatment, charted};
 use crate::rig::Quantity;
 use crate::rig::calibration::Flag;
 use crate::run::Outcome;
@@ -66,6 +66,8 @@ impl Summary<'_> {
         let fit = &fitted.fit;
         let exitance = fit.exitance();
         let mut rows = model_rows(fit, fitted.choice.as_ref(), Some(fitted.resolves));
+        let treatment = self.results.treatment(fitted);
+        rows.extend(treatment_rows(&treatment, self.setup.rig.detector.quantity));
         rows.extend(field_rows(fit, self.setup.rig.detector.quantity));
         if exitance.value > 0.0 {
             let independent = percent(exitance.u_independent / exitance.value);
@@ -254,6 +256,59 @@ fn resolves_in_words(resolves: Resolves) -> String {
     text.extend(mm("y", resolves.y_m));
     let measured = resolves.measured_to_rad.to_degrees();
     format!("{}; nothing was measured beyond {measured:.1}°", text.join(", "))
+}
+
+/// What became of readings that are no plain ones, what was fitted along, what the field was held
+/// to.
+pub(crate) fn treatment_rows(treatment: &Treatment<'_>, quantity: Quantity) -> Vec<Vec<String>> {
+    let [radiance_unit, exitance_unit, _] = quantity.units();
+    let mut rows = Vec::new();
+    if treatment.robust() != Robust::None {
+        rows.push(row("outliers", format!("weighed by {}'s rule", treatment.robust().name())));
+    }
+    let counts = treatment.counts();
+    if !counts.is_empty() {
+        let said = counts.iter().map(|(why, count)| format!("{count} {}", why.in_words()));
+        rows.push(row("readings", said.collect::<Vec<_>>().join("; ")));
+    }
+    if let Some(drift) = treatment.drift() {
+        let (begin, end) = (drift.at(drift.time_s.0), drift.at(drift.time_s.1));
+        let text = format!(
+            "{:+.3} % to {:+.3} % of the mean, fitted along: degree {} by {} reference readings",
+            100.0 * begin,
+            100.0 * end,
+            drift.degree,
+            drift.readings
+        );
+        rows.push(row("drift", text));
+    }
+    let ranges = treatment.nuisances().iter().filter(|n| !n.name.starts_with("drift"));
+    rows.extend(ranges.map(|n| {
+        let text = format!("off by {:+.2} of its u, known to {:.2} of it", n.value, n.u);
+        row(&n.name, text)
+    }));
+    match treatment.symmetry() {
+        Some(Ok(test)) => {
+            let text = format!("{} (p = {:.2})", test.symmetry.name(), test.p);
+            rows.push(row("symmetry", text));
+        }
+        Some(Err(why)) => rows.push(row("symmetry", format!("not used: {why}"))),
+        None => {}
+    }
+    if let Some(bound) = treatment.nonnegative() {
+        let text = if bound.held.is_empty() {
+            "nowhere below zero, nothing held".to_owned()
+        } else {
+            let (held, of, least) = (bound.held.len(), bound.rays, bound.least);
+            format!(
+                "held at {held} of {of} rays (down to {least:.2e} {radiance_unit} before); exitance \
+                 {:+.2e} {exitance_unit}",
+                bound.exitance
+            )
+        };
+        rows.push(row("nonnegative", text));
+    }
+    rows
 }
 
 /// What a fit says of its field, whoever asks.

@@ -8,8 +8,8 @@ use fit::{
 };
 use serde_json::{Map, Value, json};
 
-use super::DerivedQuantity;
 use super::charted::{put_charted, ray_json, region_json};
+use super::{DerivedQuantity, Treatment};
 use crate::rig::Quantity;
 
 /// What fit.json says. Numbers that do not exist are `null`.
@@ -17,6 +17,8 @@ use crate::rig::Quantity;
 pub struct FitFile<'a> {
     /// The fit.
     pub fit: &'a Fit,
+    /// What became of outliers and limits, what was fitted along, what the field was held to.
+    pub treatment: &'a Treatment<'a>,
     /// What its basis and penalty were chosen from; `None` where they were pinned.
     pub choice: Option<&'a Choice>,
     /// The narrowest feature that can be seen; `None` where the readings' rays are not at hand.
@@ -108,6 +110,11 @@ impl FitFile<'_> {
         put("n_used", json!(fit.n_used()));
         put("n_flagged", json!(self.n_flagged));
         put("n_excluded", json!(self.n_excluded));
+        put("readings", self.treatment.readings());
+        put("nuisances", self.treatment.fitted_along());
+        put("drift", self.treatment.drift_json());
+        put("symmetry", self.treatment.symmetry_json());
+        put("nonnegative", self.treatment.nonnegative_json());
         put("notes", json!(self.notes));
         if fit.region().chart == Chart::Surface {
             put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
@@ -316,6 +323,7 @@ mod tests {
         };
         let quantity = Quantity::Radiance;
         let file = FitFile {
+            treatment: &Treatment::default(),
             fit: &fit,
             choice: None,
             resolves: None,
@@ -363,6 +371,7 @@ mod tests {
         let fit = lambertian();
         for quantity in [Quantity::Luminance, Quantity::Relative] {
             let file = FitFile {
+                treatment: &Treatment::default(),
                 fit: &fit,
                 choice: None,
                 resolves: None,

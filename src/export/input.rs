@@ -9,6 +9,7 @@ use fit::{Estimate, Noise};
 use radiometry::direction;
 
 use super::number::number;
+use super::repeats::Repeats;
 use super::{ListedRay, RayChart, RayColumns};
 use crate::rig::Quantity;
 use crate::rig::calibration::{Flag, Flags};
@@ -85,6 +86,16 @@ pub enum CsvError {
     /// A header and nothing below it.
     #[error("no rows below the header; expected at least one")]
     NoRows,
+    /// A line that repeats another one in every field: a file that was appended to twice, say.
+    #[error(
+        "line {line} repeats line {first} in every field: counted twice, it would make u too small"
+    )]
+    Repeated {
+        /// The later line.
+        line: u64,
+        /// The earlier one.
+        first: u64,
+    },
     /// More than is read at once.
     #[error("more than {limit} rows")]
     TooManyRows {
@@ -94,13 +105,24 @@ pub enum CsvError {
 }
 
 /// Reads samples: `x_mm`, `y_mm`, `theta_deg`, `phi_deg` and one column of values, named after its
-/// quantity as in samples.csv; with a column `u_` of that name, the samples' uncertainty.
+/// quantity as in samples.csv; with a column `u_` of that name, the samples' uncertainty. A line
+/// that stands there twice is refused; real repeats differ in their noise, or in a further column.
 pub fn read_samples(bytes: &[u8]) -> Result<InputSamples, CsvError> {
     read_samples_in(RayChart::Surface, bytes)
 }
 
 /// As [`read_samples`], with the ray's columns of a chart.
 pub fn read_samples_in(chart: RayChart, bytes: &[u8]) -> Result<InputSamples, CsvError> {
+    read_part(chart, bytes, &mut Repeats::default(), 0)
+}
+
+/// The same of a part of a file, so many lines further down.
+pub(super) fn read_part(
+    chart: RayChart,
+    bytes: &[u8],
+    repeats: &mut Repeats,
+    lines_before: u64,
+) -> Result<InputSamples, CsvError> {
     let mut table = Table::open(bytes)?;
     let rays = table.ray_columns(chart)?;
     let (quantity, value) = table.quantity()?;
@@ -108,6 +130,9 @@ pub fn read_samples_in(chart: RayChart, bytes: &[u8]) -> Result<InputSamples, Cs
     let flags = table.find("flags")?;
     let mut samples = Vec::new();
     while let Some(row) = table.next_row(samples.len())? {
+        if let Some(first) = repeats.note(row.record, row.line + lines_before) {
+            return Err(CsvError::Repeated { line: row.line, first });
+        }
         let sample = InputSample {
             line: row.line,
             ray: row.ray(&rays)?,
@@ -162,18 +187,39 @@ impl InputSamples {
     /// it, relative to the root mean square of all values: a u relative to each value would favour
     /// those that came out low. With neither, the fit estimates one from its residuals.
     pub fn fit_samples(&self, u_relative: Option<f64>) -> Vec<fit::Sample> {
+        let noise = self.noise(u_relative);
+        self.used().map(|sample| sample.fit_sample(noise)).collect()
+    }
+
+    /// Of samples that state no u.
+    fn noise(&self, u_relative: Option<f64>) -> Noise {
+        let Some(u_relative) = u_relative else { return Noise::Unknown };
         let squares: f64 = self.used().map(|sample| sample.value * sample.value).sum();
         let mean_square = squares / self.used().count().max(1) as f64;
-        let fallback = match u_relative {
-            Some(u_relative) => Noise::Fixed { variance: u_relative * u_relative * mean_square },
-            None => Noise::Unknown,
-        };
-        self.used().map(|sample| sample.fit_sample(fallback)).collect()
+        Noise::Fixed { variance: u_relative * u_relative * mean_square }
+    }
+
+    /// The same with saturated ones, which are lower limits: where those are among the others.
+    pub fn fit_readings(&self, u_relative: Option<f64>) -> (Vec<fit::Sample>, Vec<usize>) {
+        let noise = self.noise(u_relative);
+        let samples = self.with_limits().map(|sample| sample.fit_sample(noise)).collect();
+        let places = self.with_limits().enumerate();
+        (samples, places.filter(|(_, s)| !is_used(s.flags)).map(|(i, _)| i).collect())
     }
 
     /// The samples as the fit takes them, and the lines that they stand on.
     pub fn fit_samples_with_lines(&self) -> (Vec<fit::Sample>, Vec<u64>) {
         self.used().map(|sample| (sample.fit_sample(Noise::Unknown), sample.line)).unzip()
+    }
+
+    /// Those that are used, saturated ones among them.
+    pub fn with_limits(&self) -> impl Iterator<Item = &InputSample> {
+        self.samples.iter().filter(|sample| is_used(sample.flags) || is_limit(sample))
+    }
+
+    /// Those that have no part in the fit.
+    pub fn left_out(&self) -> impl Iterator<Item = &InputSample> {
+        self.samples.iter().filter(|sample| !is_used(sample.flags) && !is_limit(sample))
     }
 
     fn used(&self) -> impl Iterator<Item = &InputSample> {
@@ -209,10 +255,20 @@ fn is_used(flags: Flags) -> bool {
     !flags.excludes_from_fit() && !flags.contains(Flag::OffSample)
 }
 
+/// Whether the sample's value is a lower limit: saturated, at its pose, and on the sample.
+fn is_limit(sample: &InputSample) -> bool {
+    let flags = sample.flags;
+    let is_elsewhere = flags.contains(Flag::Unsettled) || flags.contains(Flag::OffSample);
+    flags.contains(Flag::Saturated) && !is_elsewhere && sample.value > 0.0
+}
+
 impl CsvError {
     /// The same, so many lines further down.
     pub(super) fn later(mut self, lines: u64) -> Self {
-        if let Self::Malformed { line, .. } | Self::Field { line, .. } = &mut self {
+        if let Self::Malformed { line, .. }
+        | Self::Field { line, .. }
+        | Self::Repeated { line, .. } = &mut self
+        {
             *line += lines;
         }
         self

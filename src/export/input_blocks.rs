@@ -6,7 +6,8 @@
 use std::io::{self, Read};
 
 use super::RayChart;
-use super::input::{CsvError, InputSamples, read_samples_in};
+use super::input::{CsvError, InputSamples, read_part};
+use super::repeats::Repeats;
 
 /// Why a file's samples did not all come.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +31,7 @@ pub fn read_sample_blocks<E>(
 ) -> Result<(), BlockError<E>> {
     let mut text = Vec::new();
     let mut header: Option<Vec<u8>> = None;
+    let mut repeats = Repeats::default();
     let (mut passed, mut any, mut ended) = (0, false, false);
     while !ended {
         let room = BLOCK_BYTES.saturating_sub(text.len()) as u64;
@@ -43,11 +45,13 @@ pub fn read_sample_blocks<E>(
         let rest = text.split_off(end);
         let lines = text.split(|byte| *byte == b'\n').count() as u64 - 1;
         let before = match &header {
-            None => read_samples_in(chart, &text),
+            None => read_part(chart, &text, &mut repeats, 0),
             // The header's line stands before the block's first.
-            Some(header) => read_samples_in(chart, &[header, &text[..]].concat())
-                .map(|samples| samples.later(passed - 1))
-                .map_err(|error| error.later(passed - 1)),
+            Some(header) => {
+                read_part(chart, &[header, &text[..]].concat(), &mut repeats, passed - 1)
+                    .map(|samples| samples.later(passed - 1))
+                    .map_err(|error| error.later(passed - 1))
+            }
         };
         match before {
             Ok(samples) => {
@@ -124,6 +128,10 @@ mod tests {
         let expected = read_samples(wrong.as_bytes()).unwrap_err().to_string();
         assert!(expected.starts_with("line 1"), "{expected}");
         assert_eq!(read(&wrong).unwrap_err().to_string(), expected);
+        let twice = format!("{}0,0,3,3,1.5,\"a\nb\"\n", text(40));
+        let expected = read_samples(twice.as_bytes()).unwrap_err().to_string();
+        assert!(expected.contains("repeats line 15 in every field"), "{expected}");
+        assert_eq!(read(&twice).unwrap_err().to_string(), expected);
         let short = format!("{}0,0\n", text(40));
         let expected = read_samples(short.as_bytes()).unwrap_err().to_string();
         assert_eq!(read(&short).unwrap_err().to_string(), expected);

@@ -20,10 +20,12 @@ mod number;
 mod partial_file;
 mod ray_chart;
 mod readings;
+mod repeats;
 mod samples;
 mod samples_meta;
 #[cfg(test)]
 mod tests;
+mod treatment;
 
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
@@ -42,3 +44,4 @@ pub use ray_chart::{ListedRay, RayChart};
 pub use readings::write_readings;
 pub use samples::{RayColumns, write_samples};
 pub use samples_meta::SamplesMeta;
+pub use treatment::{TreatedReading, Treatment, Why, write_weights};

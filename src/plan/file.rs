@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use fit::{AngularKind, Outline, Wish};
+use fit::{AngularKind, Outline, Robust, Rules, Symmetry, Wish};
 use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
@@ -394,6 +394,7 @@ fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
         position_degree: degree("position_degree", POSITION_DEGREE_MAX)?,
         penalty_power: table.number("penalty_power", PENALTY_POWER)?,
         penalty_strength: table.number("penalty_strength", PENALTY_STRENGTH)?,
+        rules: read_rules(&table)?,
     };
     if fit.kind == Some(AngularKind::Splines) && fit.angular_degree.is_some() {
         return Err(table.problem(
@@ -405,6 +406,36 @@ fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
     }
     table.finish()?;
     Ok(fit)
+}
+
+/// What holds for the fit beyond its basis.
+///
+/// `robust`: "huber" or "tukey", how readings that don't belong are reweighed; "none" unless asked for,
+/// since a lobe narrower than the basis follows looks like such readings. `nonnegative`: whether the
+/// field is held above zero. `symmetry`: "rotational", "quadrant" or "plane" about the region's middle,
+/// used if the readings bear it; `symmetry_phi_deg`: the azimuth of the mirror, 0 unless said.
+/// `drift`: whether a drift by the reference readings is fitted along; where they show one unless said.
+/// `ranges`: whether the gain ranges' dark levels and gains are; where more than one is used unless said.
+fn read_rules(table: &Table<'_>) -> Result<Rules, Problem> {
+    let robust = table.choice("robust", &Robust::ALL.map(|robust| (robust.name(), robust)))?;
+    let phi_rad = table.number("symmetry_phi_deg", PHI_DEG)?.map(f64::to_radians);
+    let at = phi_rad.unwrap_or(0.0);
+    let symmetry = table.choice("symmetry", &Symmetry::all_at(at).map(|s| (s.key(), s)))?;
+    if phi_rad.is_some() && !symmetry.is_some_and(Symmetry::has_azimuth) {
+        return Err(table.problem(
+            "symmetry_phi_deg",
+            "there is no mirror to stand at an azimuth",
+            "symmetry = \"plane\" or \"quadrant\" beside it",
+            "add one of them, or leave symmetry_phi_deg out",
+        ));
+    }
+    Ok(Rules {
+        robust: robust.unwrap_or_default(),
+        nonnegative: table.flag("nonnegative")?.unwrap_or(false),
+        symmetry,
+        drift: table.flag("drift")?,
+        ranges: table.flag("ranges")?,
+    })
 }
 
 fn read_count(table: &Table<'_>, key: &str, most: i64) -> Result<u32, Problem> {

@@ -140,6 +140,10 @@ fn every_mistake_is_named_at_its_line() {
         ("angular_degree = 8", "basis = \"zernicke\"", "fit.basis"),
         ("angular_degree = 8", "angular_degree = 8\nbasis = \"splines\"", "fit.angular_degree"),
         ("angular_degree = 8", "penalty_power = -1", "fit.penalty_power"),
+        ("angular_degree = 8", "robust = \"hubert\"", "fit.robust"),
+        ("angular_degree = 8", "nonnegative = 1", "fit.nonnegative"),
+        ("angular_degree = 8", "symmetry = \"round\"", "fit.symmetry"),
+        ("angular_degree = 8", "symmetry_phi_deg = 10", "fit.symmetry_phi_deg"),
     ] {
         assert!(FULL.contains(from), "{from}");
         let problem = read(&FULL.replace(from, to)).unwrap_err();
@@ -158,4 +162,18 @@ fn what_the_fit_leaves_open_is_left_to_the_readings() {
     let fit = read(&pinned).unwrap().fit;
     assert_eq!((fit.kind, fit.angular_degree), (Some(AngularKind::EvenHarmonics), Some(6)));
     assert_eq!(fit.position_degree, None);
+    let ruled = format!(
+        "{pinned}robust = \"tukey\"\nnonnegative = true\nsymmetry = \"plane\"\n\
+         symmetry_phi_deg = 90\ndrift = false\n"
+    );
+    let rules = read(&ruled).unwrap().fit.rules;
+    let phi_rad = 90_f64.to_radians();
+    let expected = fit::Rules {
+        robust: fit::Robust::Tukey,
+        nonnegative: true,
+        symmetry: Some(fit::Symmetry::Plane { phi_rad }),
+        drift: Some(false),
+        ranges: None,
+    };
+    assert_eq!((fit.rules, rules), (fit::Rules::default(), expected));
 }

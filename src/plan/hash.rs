@@ -6,7 +6,7 @@
 use core::fmt;
 
 use firmware_protocol::Shutter;
-use fit::{Outline, Wish};
+use fit::{Outline, Rules, Symmetry, Wish};
 
 use super::{Plan, Sequence, Step};
 use crate::rig::ReadingKind;
@@ -69,6 +69,22 @@ impl Fnv {
             self.integer(wish.kind.map_or(u64::MAX, |kind| kind as u64));
             for number in numbers {
                 self.number(number.unwrap_or(-1.0));
+            }
+        }
+        let rules = &wish.rules;
+        if *rules != Rules::default() {
+            let said = |flag: Option<bool>| flag.map_or(2, u8::from);
+            self.bytes(&[
+                rules.robust as u8,
+                u8::from(rules.nonnegative),
+                said(rules.drift),
+                said(rules.ranges),
+            ]);
+            if let Some(symmetry) = rules.symmetry {
+                self.bytes(symmetry.key().as_bytes());
+                if let Symmetry::Plane { phi_rad } | Symmetry::Quadrant { phi_rad } = symmetry {
+                    self.number(phi_rad);
+                }
             }
         }
     }

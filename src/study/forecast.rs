@@ -96,7 +96,8 @@ impl Forecast {
     pub fn refusal(plan: &Plan, rig: &Rig, sequence: &Sequence) -> Option<FitError> {
         let model = plan.fit.decided()?;
         let prior = Prior::of(plan, rig, sequence.steps.first().map_or(0, |step| step.gain));
-        let samples = expected(rig, &prior, &sequence.steps).ok()?.fit_input().samples;
+        let samples =
+            expected(rig, &prior, &sequence.steps).ok()?.fit_input(&plan.fit.rules).samples;
         let work = samples.len() as f64 * (model.basis.len() as f64).powi(2);
         if work > WORK_MAX {
             return None;
@@ -114,7 +115,10 @@ impl Forecast {
         let gain = sequence.steps.first().map_or(0, |step| step.gain);
         let prior = Prior::of(plan, rig, gain);
         let calibrated = expected(rig, &prior, &sequence.steps)?;
-        let FitInput { mut samples, mut common, places } = calibrated.fit_input();
+        // Nothing drifts and nothing is saturated in a forecast; what would be fitted along is
+        // carried, which says a little more.
+        let none = fit::Rules { drift: Some(false), ranges: Some(false), ..plan.fit.rules };
+        let FitInput { mut samples, mut common, places, .. } = calibrated.fit_input(&none);
         if prior.exponent <= 0.0 && plan.sample.is_none() {
             // Being off along an even field changes nothing.
             common.retain(|c| !matches!(c.shift, Shift::Ray(_) | Shift::Jitter(_)));

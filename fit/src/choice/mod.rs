@@ -14,7 +14,9 @@ use crate::beam::Optics;
 use crate::check::check;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
-use crate::{Angular, BasisSpec, Chart, FitError, Penalised, Penalty, Position, Region, Sample};
+use crate::{
+    Angular, BasisSpec, Chart, FitError, Penalised, Penalty, Position, Ray, Region, Rules, Sample,
+};
 use family::{Family, Strengths, Trial};
 
 pub use sweeps::SweepKind;
@@ -98,6 +100,8 @@ pub struct Wish {
     pub penalty_power: Option<f64>,
     /// [`Penalty::strength`]; 0 for none. Of power 2 unless another is wished for.
     pub penalty_strength: Option<f64>,
+    /// What holds beyond the basis.
+    pub rules: Rules,
 }
 
 impl Wish {
@@ -181,6 +185,7 @@ pub fn choose(
         return Ok((model, None));
     }
     check(samples, region, smallest(region, 0, 0).into(), &[])?;
+    one_pose(samples, region)?;
     let sweeps = Sweeps::of(samples, region).thinned(READINGS_MAX);
     let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
     let mut search = Search::new(&chosen, region, wish, optics, &sweeps);
@@ -219,6 +224,23 @@ fn smallest(region: &Region, degree: usize, position_degree: usize) -> BasisSpec
         angular: angular.unwrap_or(Angular::Zernike { degree, cosine_columns: 0 }),
         position: Position::Legendre { degree: position_degree },
     }
+}
+
+/// Refuses samples that all lie along one ray; a single sample is a pose too.
+fn one_pose(samples: &[Sample], region: &Region) -> Result<(), FitError> {
+    let grid = Grid::of(samples, region);
+    let counts = [grid.x_m.len(), grid.y_m.len(), grid.theta_rad.len()];
+    let Some(first) = samples.first() else { return Ok(()) };
+    let ray = first.ray;
+    let is_along = |sample: &Sample| {
+        ray.theta_rad < ANGLE_OF_A_POSE
+            || (sample.ray.phi_rad - ray.phi_rad).abs() < ANGLE_OF_A_POSE
+    };
+    if counts.iter().any(|count| *count > 1) || !samples.iter().all(is_along) {
+        return Ok(());
+    }
+    let (readings, Ray { theta_rad, phi_rad, .. }) = (samples.len(), ray);
+    Err(FitError::OnePose { readings, theta_rad, phi_rad })
 }
 
 /// Brings the finest basis of the best one's kind to the front that does about as well: what a basis
@@ -461,3 +483,5 @@ const SPLINES: [(usize, usize); 8] =
     [(4, 8), (7, 12), (12, 8), (10, 16), (20, 10), (14, 20), (20, 16), (20, 26)];
 /// Of variances that nothing was stated about, in units of what they are taken for.
 const SCALE_LEAST: f64 = 1e-12;
+/// Azimuths closer than half a degree are one where all else is.
+const ANGLE_OF_A_POSE: f64 = 0.009;

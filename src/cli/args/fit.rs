@@ -43,6 +43,25 @@ pub(crate) struct FitArgs {
     /// Highest total degree of the polynomials over position.
     #[arg(long, value_name = "N")]
     pub(crate) position_degree: Option<usize>,
+    /// Reweigh readings that don't belong: huber, tukey or none. Tukey's leaves a reading out that is
+    /// six standard deviations off. Default: what the plan's [fit] says, or none, since a lobe
+    /// narrower than the basis follows looks like such readings.
+    #[arg(long, value_name = "NAME", conflicts_with = "merge")]
+    pub(crate) robust: Option<String>,
+    /// Hold the field above zero.
+    #[arg(long)]
+    pub(crate) nonnegative: bool,
+    /// Ask for a field that is the same turned (rotational) or mirrored (plane, quadrant) about the
+    /// region's middle, if the readings bear it; exit code 1 if they don't.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) symmetry: Option<String>,
+    /// The azimuth of the mirror of --symmetry. Default: 0.
+    #[arg(long, value_name = "DEG", requires = "symmetry", allow_negative_numbers = true)]
+    pub(crate) symmetry_phi_deg: Option<f64>,
+    /// Fit a run's drift by its reference readings along with the field (yes), or don't (no). Default:
+    /// what the plan says, or where the reference readings show one.
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no, conflicts_with = "merge")]
+    pub(crate) drift: Option<bool>,
     /// Evaluate L and u(L) at the rays of this CSV (x_mm, y_mm, theta_deg, phi_deg, or the chart's).
     #[arg(long, value_name = "FILE")]
     pub(crate) at: Option<PathBuf>,
@@ -75,4 +94,12 @@ pub(crate) struct FitArgs {
     /// Print fit.json.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn yes_or_no(text: &str) -> Result<bool, String> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("expected yes or no".to_owned()),
+    }
 }

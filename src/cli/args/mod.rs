@@ -42,7 +42,7 @@ pub(crate) enum Command {
     /// Fit again, from a run's journal or from any CSV of samples.
     ///
     /// Example: gonio fit runs/luminaire-20261122T101500Z --at rays.csv
-    Fit(FitArgs),
+    Fit(Box<FitArgs>),
     /// Render a run's report.html again, from its journal.
     ///
     /// Example: gonio report runs/luminaire-20261122T101500Z

@@ -7,7 +7,7 @@ use crate::cli::setup::Setup;
 use crate::cli::text::{duration, percent};
 use crate::journal::InputRole;
 use crate::report::significant;
-use crate::rig::calibration::{Fitted, Flag};
+use crate::rig::calibration::{Fitted, Flag, Part};
 
 /// What nobody may overlook.
 pub(super) fn banners(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Vec<String> {
@@ -117,7 +117,7 @@ fn flags(results: &Results) -> String {
         .filter(|(count, _)| *count > 0)
         .map(|(count, name)| format!("{count} {name}"))
         .collect();
-    let excluded = samples.iter().filter(|s| s.flags.excludes_from_fit()).count();
+    let excluded = samples.iter().filter(|s| s.part() == Part::None).count();
     match (said.is_empty(), excluded) {
         (true, _) => "none".to_owned(),
         (false, 0) => said.join(", "),

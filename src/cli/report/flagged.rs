@@ -1,12 +1,17 @@
 //! Readings that carry a flag, those that the fit left out first, and the effects of a simulated
 //! run: tables of bounded length that say how much they hold back.
 
+use std::collections::BTreeMap;
+
+use fit::Robust;
+
 use super::words::Words;
 use crate::cli::results::Results;
 use crate::cli::setup::Setup;
 use crate::cli::text::with_uncertainty;
+use crate::export::{TreatedReading, Treatment};
 use crate::report::{Section, Table};
-use crate::rig::calibration::{Flag, Sample};
+use crate::rig::calibration::{Flag, Part, Sample};
 
 /// Readings that are listed, at most.
 const LISTED_MAX: usize = 60;
@@ -14,18 +19,40 @@ const LISTED_MAX: usize = 60;
 /// The list of flagged readings; `None` where none is.
 pub(super) fn section(setup: &Setup, results: &Results) -> Option<Section> {
     let words = Words::of(setup.rig.detector.quantity);
-    let mut flagged: Vec<&Sample> =
-        results.calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).collect();
+    let treatment = results.fitted.as_ref().ok().map(|fitted| results.treatment(fitted));
+    let treated: BTreeMap<u64, TreatedReading> = treatment
+        .iter()
+        .flat_map(Treatment::listed)
+        .map(|reading| (reading.id, *reading))
+        .collect();
+    let of = |sample: &Sample| treated.get(&u64::from(sample.reading));
+    let is_listed = |sample: &&Sample| !sample.flags.is_empty() || of(sample).is_some();
+    let mut flagged: Vec<&Sample> = results.calibrated.samples.iter().filter(is_listed).collect();
     if flagged.is_empty() {
         return None;
     }
-    flagged.sort_by_key(|sample| !sample.flags.excludes_from_fit());
-    let excluded = flagged.iter().filter(|sample| sample.flags.excludes_from_fit()).count();
+    let place = |sample: &&Sample| match sample.part() {
+        Part::None => 0,
+        Part::Limit => 1,
+        Part::Value => 2 + u8::from(of(sample).is_none()),
+    };
+    flagged.sort_by_key(place);
     let (all, listed) = (flagged.len(), flagged.len().min(LISTED_MAX));
-    let mut paragraphs =
-        vec![format!("{all} readings carry a flag; {excluded} of them are left out of the fit.")];
+    let mut paragraphs = vec![format!("{all} readings carry a flag or are far from the fit.")];
+    if let Some(treatment) = &treatment {
+        let rule = match treatment.robust() {
+            Robust::None => "Outliers were not reweighed.".to_owned(),
+            robust => format!("Outliers were weighed by {}'s rule.", robust.name()),
+        };
+        let counts = treatment.counts();
+        let counts = counts.iter().map(|(why, count)| format!("{count} {}", why.in_words()));
+        let counts: Vec<String> = counts.collect();
+        paragraphs.push(format!("{rule} {}", counts.join("; ")));
+    }
     if listed < all {
-        paragraphs.push(format!("The first {listed} are listed; samples.csv has all."));
+        paragraphs.push(format!(
+            "The first {listed} are listed; samples.csv has all flags, weights.csv all weights."
+        ));
     }
     let columns = [
         "target",
@@ -37,7 +64,8 @@ pub(super) fn section(setup: &Setup, results: &Results) -> Option<Section> {
         "φ / °",
         words.radiance,
         "flags",
-        "in the fit",
+        "residual / u",
+        "weight",
     ];
     let row = |sample: &&Sample| {
         vec![
@@ -50,7 +78,12 @@ pub(super) fn section(setup: &Setup, results: &Results) -> Option<Section> {
             format!("{:.2}", sample.pose.phi_rad.to_degrees()),
             with_uncertainty(sample.value, sample.u, words.radiance_unit),
             sample.flags.iter().map(Flag::name).collect::<Vec<_>>().join(", "),
-            if sample.flags.excludes_from_fit() { "no" } else { "yes" }.to_owned(),
+            of(sample).and_then(|r| r.residual).map_or_else(String::new, |z| format!("{z:+.1}")),
+            match (of(sample), sample.part()) {
+                (Some(reading), _) => format!("{:.3} ({})", reading.weight, reading.why.in_words()),
+                (None, Part::None) => "0".to_owned(),
+                (None, _) => "1".to_owned(),
+            },
         ]
     };
     let table = Table {

@@ -2,16 +2,15 @@
 //! readbacks at positions of their own, scatter that nothing explains, and what a penalty smooths
 //! away. What samples share has rows of its own in every budget.
 
-use fit::{Contribution, Fit, Influence};
+use fit::{Contribution, Influence};
 
-use super::Calibrated;
+use super::{Calibrated, Fitted};
 
 impl Calibrated {
     /// The independent part of the exitance's u by source; the squares add to its square. The
     /// samples are those that the fit was made of, restated from it. Empty for a fit that no longer
     /// knows what its samples did.
-    pub fn independent_budget(&self, fit: &Fit) -> Vec<Contribution> {
-        let places = self.fit_input().places;
+    pub fn independent_budget(&self, Fitted { fit, places, .. }: &Fitted) -> Vec<Contribution> {
         let Some(Influence { exitance, moved, excess }) = fit.influence() else {
             return Vec::new();
         };
@@ -20,7 +19,7 @@ impl Calibrated {
         }
         let (mut shot, mut read, mut quantisation, mut readback, mut rest) =
             (0.0, 0.0, 0.0, 0.0, 0.0);
-        for ((place, influence), moved) in places.into_iter().zip(exitance).zip(moved) {
+        for ((place, influence), moved) in places.iter().copied().zip(exitance).zip(moved) {
             let sample = &self.samples[place];
             let square = influence * influence;
             let noise = sample.noise;

@@ -1,8 +1,11 @@
 //! The field that a run's samples show: the fit of all of them, or of those taken first.
 
-use fit::{Choice, Fit, FitError, Optics, Penalised, Ray, Region, Resolves, Wish};
+use fit::{
+    Choice, Fit, FitError, Nonnegative, Optics, Penalised, Ray, Region, Resolves, Ruled, Rules,
+    SymmetryError, SymmetryTest, Wish,
+};
 
-use super::{Calibrated, FitInput, Flag, Sample};
+use super::{Calibrated, FitInput, FittedDrift, Flag, Sample};
 
 /// A fit, what it was chosen from, and how many samples it does not rest on.
 #[derive(Debug, Clone)]
@@ -13,8 +16,16 @@ pub struct Fitted {
     pub choice: Option<Choice>,
     /// The narrowest feature that can be seen.
     pub resolves: Resolves,
-    /// Samples left out because their value is not the radiance at their pose.
+    /// Samples that have no part in it.
     pub n_excluded: usize,
+    /// Which of the run's samples the fit's own are.
+    pub places: Vec<usize>,
+    /// The drift by the reference readings, where it was fitted.
+    pub drift: Option<FittedDrift>,
+    /// How well the readings bear the symmetry asked for, or why it was not used.
+    pub symmetry: Option<Result<SymmetryTest, SymmetryError>>,
+    /// What holding the field above zero did.
+    pub nonnegative: Option<Nonnegative>,
 }
 
 impl Calibrated {
@@ -27,10 +38,15 @@ impl Calibrated {
         wish: &Wish,
         optics: Option<&Optics>,
     ) -> Result<Fitted, FitError> {
-        let input = self.fit_input();
-        let (model, choice) = fit::choose(&input.samples, region, wish, optics)?;
-        let fitted = self.fit_input_as(input, region, model, optics)?;
-        Ok(Fitted { choice, ..fitted })
+        let input = self.fit_input(&wish.rules);
+        if wish.rules.drift == Some(true) && input.drift.is_none() {
+            let missing = "it takes three reference readings or more, at different times, of a \
+                           reference that shines";
+            return Err(FitError::Nuisance { name: "drift", missing });
+        }
+        let flown = self.flown(&input);
+        let ruled = fit::fit_wished(&input.readings(&flown), region, wish, optics)?;
+        Ok(self.fitted(input, ruled, region, optics))
     }
 
     /// The same with a basis and a penalty that are known.
@@ -38,24 +54,31 @@ impl Calibrated {
         &self,
         region: &Region,
         model: Penalised,
+        rules: &Rules,
         optics: Option<&Optics>,
     ) -> Result<Fitted, FitError> {
-        self.fit_input_as(self.fit_input(), region, model, optics)
+        let input = self.fit_input(rules);
+        let flown = self.flown(&input);
+        let ruled = fit::fit_ruled(&input.readings(&flown), region, model, rules, optics)?;
+        Ok(self.fitted(input, ruled, region, optics))
     }
 
-    fn fit_input_as(
+    fn flown(&self, input: &FitInput) -> Vec<Option<(Ray, Ray)>> {
+        input.places.iter().map(|place| self.samples[*place].flown()).collect()
+    }
+
+    fn fitted(
         &self,
         input: FitInput,
+        ruled: Ruled,
         region: &Region,
-        model: Penalised,
         optics: Option<&Optics>,
-    ) -> Result<Fitted, FitError> {
-        let FitInput { samples, common, places } = input;
-        let flown: Vec<_> = places.iter().map(|place| self.samples[*place].flown()).collect();
-        let fit = fit::fit_flown(&samples, &flown, region, model, &common, optics)?;
-        let resolves = Resolves::of(&samples, region, model.basis, optics);
+    ) -> Fitted {
+        let FitInput { samples, places, drift, .. } = input;
+        let Ruled { fit, choice, symmetry, nonnegative } = ruled;
+        let resolves = Resolves::of(&samples, region, fit.basis(), optics);
         let n_excluded = self.samples.len() - samples.len();
-        Ok(Fitted { fit, choice: None, resolves, n_excluded })
+        Fitted { fit, choice, resolves, n_excluded, places, drift, symmetry, nonnegative }
     }
 
     /// What was known when `count` samples had been taken.

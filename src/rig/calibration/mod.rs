@@ -16,8 +16,11 @@
 mod budget;
 mod component;
 mod dark;
+mod drift;
 mod fit_input;
 mod fitting;
+#[cfg(test)]
+mod fitting_tests;
 mod readback;
 mod reference;
 mod sample;
@@ -26,10 +29,11 @@ mod tests;
 
 pub use component::{Component, Effect};
 pub use dark::Dark;
+pub use drift::FittedDrift;
 pub use fit_input::FitInput;
 pub use fitting::Fitted;
 pub use reference::{Drift, Reference};
-pub use sample::{Flag, Flags, Sample};
+pub use sample::{Flag, Flags, Part, Sample};
 
 use radiometry::direction;
 

@@ -14,12 +14,21 @@ pub struct Reference {
     pub id: u32,
     /// The session that took it.
     pub session: u32,
-    /// Run time, seconds.
+    /// Run time at which the integration began, seconds.
     pub time_s: f64,
+    /// The integration, seconds, by the device's clock.
+    pub dwell_s: f64,
     /// The radiance.
     pub value: f64,
     /// Standard uncertainty by what is independent from reading to reading.
     pub u_independent: f64,
+}
+
+impl Reference {
+    /// Run time in the middle of the integration, seconds.
+    pub fn middle_s(&self) -> f64 {
+        self.time_s + 0.5 * self.dwell_s
+    }
 }
 
 /// What the reference readings did during a run.
@@ -73,6 +82,7 @@ pub(super) fn from_reading(rig: &Rig, darks: &[Dark], reading: &Reading) -> Refe
         id: reading.id,
         session: reading.session,
         time_s: reading.time_s,
+        dwell_s: (reading.end_us - reading.start_us) as f64 / 1e6,
         value,
         u_independent: libm::sqrt(noise.floor + noise.per_radiance * value.max(0.0)),
     }

@@ -72,6 +72,17 @@ pub enum Flag {
     OffSample,
 }
 
+/// What part a sample has in the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// It is the radiance at its pose, to its uncertainty.
+    Value,
+    /// The radiance at its pose is no less: saturated.
+    Limit,
+    /// None: its pose is not known.
+    None,
+}
+
 /// A set of flags.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Flags(u8);
@@ -124,8 +135,8 @@ impl Flags {
         self.0 == 0
     }
 
-    /// Whether the value says something else than the radiance at its pose, so that a fit must
-    /// leave it out. One below the noise stays in: leaving it out would bias the fit upwards. So
+    /// Whether the value says something else than the radiance at its pose, so that a fit can't take
+    /// it for that: see [`Sample::part`] for what it does instead. One below the noise stays in: leaving it out would bias the fit upwards. So
     /// does one off the sample, of which the fit takes the mean over what is on it.
     pub const fn excludes_from_fit(self) -> bool {
         self.contains(Flag::Saturated) || self.contains(Flag::Unsettled)
@@ -159,6 +170,23 @@ impl Sample {
     /// The way of a reading taken in flight as the fit takes it.
     pub fn flown(&self) -> Option<(fit::Ray, fit::Ray)> {
         self.way.map(|(from, to)| (ray(from), ray(to)))
+    }
+
+    /// Run time in the middle of the integration, seconds.
+    pub fn middle_s(&self) -> f64 {
+        self.time_s + 0.5 * self.dwell_s
+    }
+
+    /// What the fit makes of it.
+    pub fn part(&self) -> Part {
+        if self.flags.contains(Flag::Unsettled) {
+            Part::None
+        } else if self.flags.contains(Flag::Saturated) {
+            // At the lower end of the range the value is too high: a limit of another kind.
+            if self.value > 0.0 { Part::Limit } else { Part::None }
+        } else {
+            Part::Value
+        }
     }
 
     /// States the uncertainty as it is at `level`: the fitted one where it is known.

@@ -222,7 +222,14 @@ fn a_steady_drift_has_its_slope() {
     let references: Vec<Reference> = (0..5)
         .map(|id| {
             let time_s = f64::from(id) * 10.0;
-            Reference { id, session: 0, time_s, value: 2.0 + 0.01 * time_s, u_independent: 0.1 }
+            Reference {
+                id,
+                session: 0,
+                time_s,
+                dwell_s: 0.0,
+                value: 2.0 + 0.01 * time_s,
+                u_independent: 0.1,
+            }
         })
         .collect();
     let drift = Drift::of(&references).unwrap();
@@ -308,8 +315,10 @@ fn the_fit_gets_the_usable_samples_and_what_they_share() {
     let last = target(&rig, 5, 0.5);
     let readings = [dark(&rig, 0, DARK_A), target(&rig, 1, 0.5), fine, fine_dark, saturated, last];
     let calibrated = calibrate(&rig, &readings).unwrap();
-    let input = calibrated.fit_input();
-    assert_eq!(input.places, [0, 1, 3]);
+    let carried = fit::Rules { ranges: Some(false), ..fit::Rules::default() };
+    let input = calibrated.fit_input(&carried);
+    assert_eq!((&*input.places, &*input.limits), ([0, 1, 2, 3].as_slice(), [2].as_slice()));
+    assert!(input.nuisances.is_empty());
     let by_name =
         |name: &str| &input.common.iter().find(|common| common.name == name).unwrap().shift;
     assert!(matches!(by_name("responsivity"), fit::Shift::Scale));
@@ -318,8 +327,17 @@ fn the_fit_gets_the_usable_samples_and_what_they_share() {
     assert_close(excess(1, 2.0), 2.0 * u);
     assert!(excess(0, 2.0).abs() + excess(2, 2.0).abs() < f64::MIN_POSITIVE);
     let fit::Shift::Ray(seen) = by_name("x zero") else { panic!("an axis moves rays") };
-    let sample = &input.samples[2];
-    assert_close(seen(2, &sample.ray).x_m - sample.ray.x_m, rig.axes[2].u_zero);
+    let sample = &input.samples[3];
+    assert_close(seen(3, &sample.ray).x_m - sample.ray.x_m, rig.axes[2].u_zero);
+    // Where more than one range was used, the ranges' own components are fitted along.
+    let fitted = calibrated.fit_input(&fit::Rules::default());
+    let names = |common: &[fit::Common]| -> Vec<String> {
+        let own =
+            common.iter().filter(|c| c.name.starts_with("gain") || c.name.starts_with("dark"));
+        own.map(|c| c.name.clone()).collect()
+    };
+    assert_eq!(names(&fitted.nuisances), names(&input.common));
+    assert!(names(&fitted.common).is_empty() && fitted.nuisances.len() >= 2);
 }
 
 #[test]
@@ -333,7 +351,7 @@ fn what_a_readback_is_off_by_is_shared_by_the_samples_of_a_position() {
     let readings =
         [dark(&rig, 0, DARK_A), at(1, 10_000, 0), at(2, 10_000, 20_000), at(3, 30_000, 40_000)];
     let calibrated = calibrate(&rig, &readings).unwrap();
-    let input = calibrated.fit_input();
+    let input = calibrated.fit_input(&fit::Rules::default());
     let of = |start: &str| -> Vec<&fit::Common> {
         input.common.iter().filter(|common| common.name.starts_with(start)).collect()
     };
@@ -369,7 +387,7 @@ fn many_positions_share_components_that_have_their_squares() {
             readings.push(Reading { start: at, end: at, ..target(&rig, id, 0.5) });
         }
     }
-    let input = calibrate(&rig, &readings).unwrap().fit_input();
+    let input = calibrate(&rig, &readings).unwrap().fit_input(&fit::Rules::default());
     let u = rig.axes[0].u_readback;
     let theta = input.common.iter().filter(|c| c.name.starts_with("theta readback"));
     let shifts: Vec<Vec<f64>> = theta

@@ -1,0 +1,118 @@
+//! From readings to the field by rules that a person set: basis chosen, weights settled, symmetry tested,
+//! darkness kept from being darker. The one way that runs and files go.
+
+use crate::choice::{Choice, Wish, choose};
+use crate::{
+    Fit, FitError, Nonnegative, Optics, Penalised, Readings, Region, Robust, Sample, Symmetry,
+    SymmetryError, SymmetryTest,
+};
+
+/// What holds for a fit beyond its basis.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Rules {
+    /// How outliers are weighed.
+    pub robust: Robust,
+    /// Whether the field is held above zero.
+    pub nonnegative: bool,
+    /// What it is said to be the same under.
+    pub symmetry: Option<Symmetry>,
+    /// Whether a drift is fitted along with the field; `None`: where reference readings show one. Who
+    /// makes the readings knows how.
+    pub drift: Option<bool>,
+    /// Whether dark levels and gains of the detector's ranges are fitted along; `None`: where more
+    /// than one range was used.
+    pub ranges: Option<bool>,
+}
+
+/// A field, and what led to it.
+#[derive(Debug, Clone)]
+pub struct Ruled {
+    /// The field.
+    pub fit: Fit,
+    /// What basis and penalty were chosen from; `None` where nothing was left to choose.
+    pub choice: Option<Choice>,
+    /// How well the readings bear the symmetry asked for, or why it was not used: the field is then
+    /// the one without it.
+    pub symmetry: Option<Result<SymmetryTest, SymmetryError>>,
+    /// What holding the field above zero did, if that was asked for.
+    pub nonnegative: Option<Nonnegative>,
+}
+
+/// The fit of readings in the basis that the wish pins or that they ask for, by its rules. Limits
+/// have no part in the choice of the basis; nor have, once they are known, readings that lost nearly
+/// all their weight.
+pub fn fit_wished(
+    readings: &Readings<'_>,
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<Ruled, FitError> {
+    let said: Vec<Sample> = kept(readings, |i| readings.limits.binary_search(&i).is_err());
+    // Nothing but limits is refused for what it is by the fit.
+    let (model, choice) = if said.is_empty() {
+        choose(readings.samples, region, wish, optics)?
+    } else {
+        choose(&said, region, wish, optics)?
+    };
+    let rules = &wish.rules;
+    let mut ruled = Ruled { choice, ..fit_ruled(readings, region, model, rules, optics)? };
+    let outlying = |fit: &Fit| {
+        let weighed = fit.weighed()?;
+        let is_outlying = |i: usize| weighed.weights[i] < OUTLYING && !weighed.limits.contains(&i);
+        let any = (0..weighed.weights.len()).any(is_outlying);
+        any.then(|| {
+            kept(readings, |i| !is_outlying(i) && readings.limits.binary_search(&i).is_err())
+        })
+    };
+    if rules.robust != Robust::None
+        && ruled.choice.is_some()
+        && let Some(said) = outlying(&ruled.fit)
+    {
+        let (model, choice) = choose(&said, region, wish, optics)?;
+        ruled = Ruled { choice, ..fit_ruled(readings, region, model, rules, optics)? };
+    }
+    Ok(ruled)
+}
+
+/// The same in a basis that is known.
+pub fn fit_ruled(
+    readings: &Readings<'_>,
+    region: &Region,
+    model: Penalised,
+    rules: &Rules,
+    optics: Option<&Optics>,
+) -> Result<Ruled, FitError> {
+    let readings = Readings { robust: rules.robust, ..*readings };
+    let fit = crate::fit_readings(&readings, region, model, optics)?;
+    fit.ruled(rules)
+}
+
+impl Fit {
+    /// The field with the symmetry asked for, if the readings bear it, and above zero.
+    pub fn ruled(self, rules: &Rules) -> Result<Ruled, FitError> {
+        let mut ruled = Ruled { fit: self, choice: None, symmetry: None, nonnegative: None };
+        if let Some(symmetry) = rules.symmetry {
+            ruled.symmetry = Some(match ruled.fit.symmetric(symmetry) {
+                Ok((fit, test)) => {
+                    ruled.fit = fit;
+                    Ok(test)
+                }
+                Err(SymmetryError::Fit(error)) => return Err(error),
+                Err(error) => Err(error),
+            });
+        }
+        if rules.nonnegative {
+            let (fit, bound) = ruled.fit.nonnegative()?;
+            (ruled.fit, ruled.nonnegative) = (fit, Some(bound));
+        }
+        Ok(ruled)
+    }
+}
+
+fn kept(readings: &Readings<'_>, is_kept: impl Fn(usize) -> bool) -> Vec<Sample> {
+    let samples = readings.samples.iter().enumerate();
+    samples.filter(|(i, _)| is_kept(*i)).map(|(_, sample)| *sample).collect()
+}
+
+/// A reading with less of its weight left has no say in the choice of the basis.
+const OUTLYING: f64 = 0.1;

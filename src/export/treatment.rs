@@ -1,0 +1,289 @@
+//! What became of readings that are not simply what they read (outliers, limits, those left out), what was
+//! fitted along with the field, and what it was held to: for fit.json and weights.csv.
+
+use std::io::{self, Write};
+
+use fit::{Fit, FittedNuisance, Nonnegative, Robust, SymmetryError, SymmetryTest};
+use serde_json::{Value, json};
+
+use super::RayColumns;
+use super::number::number;
+use crate::rig::Quantity;
+use crate::rig::calibration::FittedDrift;
+
+/// Readings that fit.json lists at most; where there are more, weights.csv has all.
+const LISTED_MAX: usize = 50;
+/// A residual beyond so many of its standard deviations is remarkable.
+const REMARKABLE: f64 = 5.0;
+/// A reading with less of its weight left counts as downweighted.
+const DOWNWEIGHTED: f64 = 0.5;
+/// A limit that holds less than this part of a reading's information doesn't hold the field.
+const HOLDING: f64 = 1e-3;
+
+/// What was done beyond least squares.
+#[derive(Debug, Clone, Default)]
+pub struct Treatment<'a> {
+    /// How outliers were weighed.
+    robust: Robust,
+    listed: Vec<TreatedReading>,
+    nuisances: &'a [FittedNuisance],
+    drift: Option<&'a FittedDrift>,
+    symmetry: Option<&'a Result<SymmetryTest, SymmetryError>>,
+    nonnegative: Option<&'a Nonnegative>,
+}
+
+/// A reading that is listed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreatedReading {
+    /// The reading's id in readings.csv, or its line in a CSV.
+    pub id: u64,
+    /// Its ray.
+    pub ray: fit::Ray,
+    /// What it read.
+    pub value: f64,
+    /// (value - fitted) in standard deviations of a residual; `None` of one that has no part in the
+    /// fit.
+    pub residual: Option<f64>,
+    /// What is left of its weight.
+    pub weight: f64,
+    /// Why it is listed.
+    pub why: Why,
+}
+
+/// Why a reading is listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// It was not settled, or not on the sample: left out.
+    LeftOut,
+    /// Saturated: a lower limit that the field exceeds anyway.
+    LimitExceeded,
+    /// Saturated: a lower limit that holds the field up.
+    LimitHolding,
+    /// Its weight was taken away, most of it or all.
+    Downweighted,
+    /// Far off, and weighed like all others.
+    Remarkable,
+}
+
+impl Why {
+    const ALL: [Self; 5] = [
+        Self::LeftOut,
+        Self::LimitExceeded,
+        Self::LimitHolding,
+        Self::Downweighted,
+        Self::Remarkable,
+    ];
+
+    /// As files name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LeftOut => "left_out",
+            Self::LimitExceeded => "limit_exceeded",
+            Self::LimitHolding => "limit_holding",
+            Self::Downweighted => "downweighted",
+            Self::Remarkable => "remarkable",
+        }
+    }
+
+    /// In words, of so many readings.
+    pub const fn in_words(self) -> &'static str {
+        match self {
+            Self::LeftOut => "left out",
+            Self::LimitExceeded => "saturated, which the field exceeds anyway",
+            Self::LimitHolding => "saturated, lower limits that hold the field up",
+            Self::Downweighted => "downweighted by half or more",
+            Self::Remarkable => "more than 5 u off and weighed like all others",
+        }
+    }
+}
+
+impl<'a> Treatment<'a> {
+    /// Of a fit whose sample i is the reading `name(i)`: its id, ray and value; and of those left out.
+    pub fn of(
+        fit: &'a Fit,
+        name: impl Fn(usize) -> (u64, fit::Ray, f64),
+        left_out: impl IntoIterator<Item = (u64, fit::Ray, f64)>,
+    ) -> Self {
+        let mut listed: Vec<TreatedReading> = left_out
+            .into_iter()
+            .map(|(id, ray, value)| {
+                let why = Why::LeftOut;
+                TreatedReading { id, ray, value, residual: None, weight: 0.0, why }
+            })
+            .collect();
+        let Some(weighed) = fit.weighed() else { return Self { listed, ..Self::default() } };
+        for (i, (&weight, &z)) in weighed.weights.iter().zip(&weighed.residuals).enumerate() {
+            let why = if weighed.limits.binary_search(&i).is_ok() {
+                if weight < HOLDING { Why::LimitExceeded } else { Why::LimitHolding }
+            } else if weight < DOWNWEIGHTED {
+                Why::Downweighted
+            } else if z.abs() > REMARKABLE {
+                Why::Remarkable
+            } else {
+                continue;
+            };
+            let (id, ray, value) = name(i);
+            listed.push(TreatedReading { id, ray, value, residual: Some(z), weight, why });
+        }
+        let size = |reading: &TreatedReading| reading.residual.map_or(f64::INFINITY, f64::abs);
+        listed.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.id.cmp(&b.id)));
+        Self { robust: weighed.robust, listed, nuisances: &weighed.nuisances, ..Self::default() }
+    }
+
+    /// With what the field was held to.
+    #[must_use]
+    pub fn with_rules(
+        self,
+        symmetry: Option<&'a Result<SymmetryTest, SymmetryError>>,
+        nonnegative: Option<&'a Nonnegative>,
+    ) -> Self {
+        Self { symmetry, nonnegative, ..self }
+    }
+
+    /// With the drift that was taken out.
+    #[must_use]
+    pub fn with_drift(self, drift: Option<&'a FittedDrift>) -> Self {
+        Self { drift, ..self }
+    }
+
+    /// How well the readings bear the symmetry asked for, or why it was not used.
+    pub fn symmetry(&self) -> Option<&'a Result<SymmetryTest, SymmetryError>> {
+        self.symmetry
+    }
+
+    /// What holding the field above zero did.
+    pub fn nonnegative(&self) -> Option<&'a Nonnegative> {
+        self.nonnegative
+    }
+
+    /// The drift that was taken out.
+    pub fn drift(&self) -> Option<&'a FittedDrift> {
+        self.drift
+    }
+
+    /// What was fitted along.
+    pub fn nuisances(&self) -> &'a [FittedNuisance] {
+        self.nuisances
+    }
+
+    /// Every reading that is no plain one, the farthest off first.
+    pub fn listed(&self) -> &[TreatedReading] {
+        &self.listed
+    }
+
+    /// Whether there are more of them than fit.json lists, so that weights.csv is written.
+    pub fn is_long(&self) -> bool {
+        self.listed.len() > LISTED_MAX
+    }
+
+    /// How many there are of each kind, those kinds that there are.
+    pub fn counts(&self) -> Vec<(Why, usize)> {
+        let count = |why| self.listed.iter().filter(|reading| reading.why == why).count();
+        Why::ALL.into_iter().map(|why| (why, count(why))).filter(|(_, n)| *n > 0).collect()
+    }
+
+    /// How outliers were weighed.
+    pub fn robust(&self) -> Robust {
+        self.robust
+    }
+
+    pub(super) fn readings(&self) -> Value {
+        let mut object = json!({"robust": self.robust.name()});
+        for why in Why::ALL {
+            let count = self.listed.iter().filter(|reading| reading.why == why).count();
+            object[why.name()] = json!(count);
+        }
+        let listed = self.listed.iter().take(LISTED_MAX).map(|reading| {
+            let [x_mm, y_mm, theta_deg, phi_deg] = columns(&reading.ray);
+            json!({
+                "reading": reading.id, "x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg,
+                "phi_deg": phi_deg, "value": reading.value, "residual_over_u": reading.residual,
+                "weight": reading.weight, "why": reading.why.name(),
+            })
+        });
+        object["listed"] = listed.collect();
+        object
+    }
+
+    pub(super) fn fitted_along(&self) -> Value {
+        let row = |fitted: &FittedNuisance| json!({"name": fitted.name, "value_over_prior_u": fitted.value, "u_over_prior_u": fitted.u});
+        self.nuisances.iter().map(row).collect()
+    }
+
+    pub(super) fn drift_json(&self) -> Value {
+        let Some(drift) = self.drift else { return Value::Null };
+        let at = |time_s: f64| {
+            let (value, u) = drift.at_with_u(time_s);
+            json!({"time_s": time_s, "relative": value, "u_by_reference": u})
+        };
+        let (from, to) = drift.time_s;
+        let times = (0..=10).map(|k| from + 0.1 * f64::from(k) * (to - from));
+        json!({
+            "reference_readings": drift.readings, "degree": drift.degree, "chi2": drift.chi2,
+            "dof": drift.dof, "curve": times.map(at).collect::<Vec<Value>>(),
+        })
+    }
+
+    pub(super) fn symmetry_json(&self) -> Value {
+        match self.symmetry {
+            None => Value::Null,
+            Some(Ok(test)) => tested(test, true),
+            Some(Err(SymmetryError::Contradicted(test))) => tested(test, false),
+            Some(Err(error)) => json!({"used": false, "why": error.to_string()}),
+        }
+    }
+
+    pub(super) fn nonnegative_json(&self) -> Value {
+        let Some(bound) = self.nonnegative else { return Value::Null };
+        let ray = |ray: &fit::Ray| {
+            json!({
+                "x_mm": ray.x_m * 1e3, "y_mm": ray.y_m * 1e3,
+                "theta_deg": ray.theta_rad.to_degrees(), "phi_deg": ray.phi_rad.to_degrees(),
+            })
+        };
+        json!({
+            "rays": bound.rays, "n_held": bound.held.len(), "least_before": bound.least,
+            "exitance_change": bound.exitance,
+            "held": bound.held.iter().take(LISTED_MAX).map(ray).collect::<Vec<Value>>(),
+        })
+    }
+}
+
+/// In the units of files.
+fn columns(ray: &fit::Ray) -> [f64; 4] {
+    [ray.x_m * 1e3, ray.y_m * 1e3, ray.theta_rad.to_degrees(), ray.phi_rad.to_degrees()]
+}
+
+fn tested(test: &SymmetryTest, is_used: bool) -> Value {
+    json!({
+        "used": is_used, "name": test.symmetry.key(), "forbidden": test.forbidden,
+        "chi2": test.chi2, "p": test.p,
+    })
+}
+
+/// Writes weights.csv: every reading that is no plain one, the farthest off first.
+pub fn write_weights(
+    out: impl Write,
+    quantity: Quantity,
+    treatment: &Treatment<'_>,
+) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    let [x, y, theta, phi] = RayColumns::NAMES;
+    let radiance = quantity.radiance_column();
+    csv.write_record(["reading", x, y, theta, phi, radiance, "residual_over_u", "weight", "why"])?;
+    for reading in &treatment.listed {
+        let [x, y, theta, phi] = columns(&reading.ray).map(number);
+        csv.write_record([
+            &reading.id.to_string(),
+            &x,
+            &y,
+            &theta,
+            &phi,
+            &number(reading.value),
+            &reading.residual.map_or_else(String::new, number),
+            &number(reading.weight),
+            reading.why.name(),
+        ])?;
+    }
+    csv.flush()
+}
