@@ -44,8 +44,7 @@ fn readings(
         let time_s = f64::from(id);
         let mut reading = at_rest(id, kind, at, gain);
         let n = reading.n;
-        let radiance =
-            shines.map_or_else(|| field(&ray(rig.measured(&reading).1)), |radiance| radiance);
+        let radiance = shines.unwrap_or_else(|| field(&ray(rig.measured(&reading).1)));
         let radiance =
             if kind == ReadingKind::Dark { 0.0 } else { signal(radiance, time_s + 0.025) };
         let noise = rig.detector.modelled_variance(gain, n, DARK_A);
