@@ -76,6 +76,7 @@ mod fitted;
 mod functional;
 mod grid;
 mod influence;
+pub mod kriging;
 mod limit;
 mod nonnegative;
 mod nuisance;
