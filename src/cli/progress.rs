@@ -65,10 +65,14 @@ impl ProgressLine {
     }
 
     fn show_progress(&self, progress: Progress) {
-        let Progress { done, total, rig_s, rest_s } = progress;
+        let Progress { done, total, rig_s, rest_s, rest_most_s } = progress;
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
         self.bar.set_prefix(match self.pace {
+            _ if rest_most_s.is_some() => {
+                let most_s = rest_most_s.unwrap_or(rest_s);
+                format!("round {} left, run at most {}", duration(rest_s), duration(most_s))
+            }
             Pace::Real => format!("{} left", duration(rest_s)),
             Pace::Virtual => format!("rig {} of {}", duration(rig_s), duration(rig_s + rest_s)),
         });

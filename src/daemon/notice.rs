@@ -98,7 +98,9 @@ pub struct Progress {
 impl From<crate::run::Progress> for Progress {
     fn from(progress: crate::run::Progress) -> Self {
         let (done, total) = (progress.done as u64, progress.total as u64);
-        Self { done, total, eta_s: (total > 0).then_some(progress.rest_s) }
+        // At most, where nobody knows better.
+        let rest_s = progress.rest_most_s.unwrap_or(progress.rest_s);
+        Self { done, total, eta_s: (total > 0).then_some(rest_s) }
     }
 }
 

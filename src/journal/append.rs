@@ -174,6 +174,16 @@ fn insert<'a>(connection: &Connection, record: &'a Record) -> rusqlite::Result<I
                     check.verdict.name()
                 ])?;
         }
+        Record::Round { number, account, steps } => {
+            let count = i64::try_from(steps.len()).unwrap_or(i64::MAX);
+            connection.execute(
+                "INSERT INTO rounds VALUES (?1, ?2, ?3)",
+                params![number, count, account],
+            )?;
+            for step in steps {
+                steps::insert(connection, step)?;
+            }
+        }
         Record::SessionBegan { number, boot_id, started_s } => {
             connection.execute(
                 "INSERT INTO sessions (number, boot_id, started_s) VALUES (?1, ?2, ?3)",
@@ -316,6 +326,8 @@ fn check_finite(record: &Record) -> Result<(), JournalError> {
             ("reference check after", check.after),
             ("reference check u_difference", check.u_difference),
         ],
+        // Laid out on a rig: its numbers are finite.
+        Record::Round { .. } => &[],
         Record::SessionBegan { started_s, .. } => &[("session started_s", *started_s)],
         Record::SessionEnded { ended_s, .. } => &[("session ended_s", *ended_s)],
     };

@@ -30,7 +30,7 @@ pub use error::JournalError;
 pub use queue::{Queue, QueueState, QueuedRun};
 pub use read::{Order, Reader};
 pub use record::{
-    EffectWishes, Event, EventKind, Header, Input, InputRole, Record, ReferenceCheck, Session,
-    Verdict,
+    EffectWishes, Event, EventKind, Header, Input, InputRole, Record, ReferenceCheck, Round,
+    Session, Verdict,
 };
 pub use writer::{Progress, Writer};

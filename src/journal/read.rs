@@ -6,7 +6,7 @@ use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ValueRef};
 use rusqlite::{Connection, OptionalExtension, Row};
 
 use super::{
-    EffectWishes, Event, EventKind, Header, Input, InputRole, JournalError, ReferenceCheck,
+    EffectWishes, Event, EventKind, Header, Input, InputRole, JournalError, ReferenceCheck, Round,
     Session, Verdict, schema, steps,
 };
 use crate::plan::Step;
@@ -107,7 +107,14 @@ impl Reader {
         })
     }
 
-    /// The fixed sequence of steps, in its order.
+    /// The decisions on the way, in their order; none of a run whose sequence was fixed beforehand.
+    pub fn rounds(&self) -> Result<Vec<Round>, JournalError> {
+        self.rows("SELECT number, steps, account FROM rounds ORDER BY number", |row| {
+            Ok(Round { number: row.get(0)?, steps: row.get(1)?, account: row.get(2)? })
+        })
+    }
+
+    /// The sequence of steps, in its order: fixed before the run, but for what rounds added.
     pub fn steps(&self) -> Result<Vec<Step>, JournalError> {
         self.rows(steps::SELECT, steps::from_row)
     }

@@ -1,5 +1,6 @@
 //! What a journal holds, free of how it is stored.
 
+use crate::plan::Step;
 use crate::rig::Reading;
 
 /// What is known when a run begins, and never changes.
@@ -137,6 +138,18 @@ pub struct ReferenceCheck {
     pub verdict: Verdict,
 }
 
+/// A decision of a run that decides on the way what it measures next. It is durable before any of
+/// its steps is executed, and never made again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Round {
+    /// Which decision: 0 was made after the steps that the run began with.
+    pub number: u32,
+    /// How many steps it added to the sequence; 0 ends the run.
+    pub steps: u32,
+    /// What it rests on, in whoever decides' own words; the journal doesn't look into it.
+    pub account: String,
+}
+
 /// One line of the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
@@ -146,6 +159,15 @@ pub enum Record {
     Reading(Reading),
     /// A resume measured the reference pose again.
     ReferenceCheck(ReferenceCheck),
+    /// It was decided what is measured next: these steps follow those that there are.
+    Round {
+        /// 0, and one more with every decision.
+        number: u32,
+        /// What the decision rests on.
+        account: String,
+        /// The steps; none at the end of the run.
+        steps: Vec<Step>,
+    },
     /// A session began.
     SessionBegan {
         /// 0, and one more after every resume.

@@ -12,10 +12,13 @@ use rusqlite::{Connection, OpenFlags};
 use super::JournalError;
 
 /// Raised whenever a table changes.
-pub(super) const VERSION: i64 = 2;
+pub(super) const VERSION: i64 = 3;
 
 /// Version 1 had no sweeps; but for their tables it is the same.
 const WITHOUT_SWEEPS: i64 = 1;
+
+/// Version 2 had no rounds; but for their table it is the same.
+const WITHOUT_ROUNDS: i64 = 2;
 
 /// "GoNi": what `file` and SQLite call the application id.
 pub(super) const APPLICATION_ID: i64 = 0x476f_4e69;
@@ -143,6 +146,15 @@ CREATE {temporary} TABLE swept_readings (
 ) STRICT;
 ";
 
+/// Decisions on the way, for runs whose sequence is not all fixed beforehand.
+const ROUNDS: &str = "
+CREATE {temporary} TABLE rounds (
+    number INTEGER PRIMARY KEY,
+    steps INTEGER NOT NULL,
+    account TEXT NOT NULL
+) STRICT;
+";
+
 /// Before the first transaction.
 pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "page_size", PAGE_BYTES.cast_signed())
@@ -151,7 +163,9 @@ pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
 /// Creates the tables in an open transaction, and marks the file as a journal.
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch(TABLES)?;
-    connection.execute_batch(&SWEEPS.replace("{temporary}", ""))?;
+    for tables in [SWEEPS, ROUNDS] {
+        connection.execute_batch(&tables.replace("{temporary}", ""))?;
+    }
     connection.pragma_update(None, "application_id", APPLICATION_ID)?;
     connection.pragma_update(None, "user_version", VERSION)
 }
@@ -221,14 +235,22 @@ pub(super) fn check(path: &Path, connection: &Connection) -> Result<(), JournalE
         return Err(JournalError::NotAJournal { path: path.to_owned(), found });
     }
     let found = pragma("user_version").map_err(fail)?;
-    if found == WITHOUT_SWEEPS {
-        // Empty, for this connection alone, so that one way of reading does for both.
-        let empty = SWEEPS.replace("{temporary}", "TEMPORARY");
+    let missing: &[&str] = match found {
+        VERSION => &[],
+        WITHOUT_ROUNDS => &[ROUNDS],
+        WITHOUT_SWEEPS => &[SWEEPS, ROUNDS],
+        _ => {
+            let path = path.to_owned();
+            return Err(JournalError::Schema { path, found, expected: VERSION });
+        }
+    };
+    if !missing.is_empty() {
         connection.execute_batch("PRAGMA temp_store = MEMORY;").map_err(fail)?;
+    }
+    for tables in missing {
+        // Empty, for this connection alone, so that one way of reading does for all.
+        let empty = tables.replace("{temporary}", "TEMPORARY");
         connection.execute_batch(&empty).map_err(fail)?;
-    } else if found != VERSION {
-        let path = path.to_owned();
-        return Err(JournalError::Schema { path, found, expected: VERSION });
     }
     check_length(path)
 }

@@ -310,7 +310,8 @@ fn a_journal_from_before_there_were_sweeps_is_read_and_carried_on() {
     let mut journal = folder.journal();
     let at_rest = |id| Reading { travel: Latched([0; 4]), ..reading(id) };
     journal.append(&[Record::Reading(at_rest(0))]).unwrap();
-    let old = "DROP TABLE swept_steps; DROP TABLE swept_readings; PRAGMA user_version = 1;";
+    let old = "DROP TABLE swept_steps; DROP TABLE swept_readings; DROP TABLE rounds; \
+               PRAGMA user_version = 1;";
     journal.reader().connection().execute_batch(old).unwrap();
     journal.close().unwrap();
     let readings = |reader: &Reader| reader.readings(Order::Id).unwrap();
@@ -322,12 +323,51 @@ fn a_journal_from_before_there_were_sweeps_is_read_and_carried_on() {
 }
 
 #[test]
+fn a_journal_from_before_there_were_rounds_is_read_and_carried_on() {
+    let folder = Folder::new();
+    let mut journal = folder.journal();
+    journal.append(&records(0..1)).unwrap();
+    let old = "DROP TABLE rounds; PRAGMA user_version = 2;";
+    journal.reader().connection().execute_batch(old).unwrap();
+    journal.close().unwrap();
+    assert_eq!(Reader::open(&folder.path()).unwrap().rounds().unwrap(), []);
+    let mut journal = Journal::open(&folder.path()).unwrap();
+    journal.append(&records(1..2)).unwrap();
+    let reader = journal.reader();
+    assert_eq!(reader.readings(Order::Id).unwrap(), [reading(0), reading(1)]);
+    assert_eq!(reader.steps().unwrap(), steps());
+}
+
+#[test]
+fn a_round_and_its_steps_are_kept_together_or_not_at_all() {
+    let folder = Folder::new();
+    let mut journal = folder.journal();
+    let before = steps();
+    let next: Vec<Step> = before.iter().map(|step| Step { id: step.id + 1000, ..*step }).collect();
+    let round = |number, steps: &[Step]| Record::Round {
+        number,
+        account: format!("{{\"round\": {number}}}"),
+        steps: steps.to_vec(),
+    };
+    journal.append(&[round(0, &next), round(1, &[])]).unwrap();
+    // A step's name is taken: nothing of the round stands.
+    assert!(journal.append(&[round(2, &next)]).is_err());
+    journal.close().unwrap();
+    let reader = Reader::open(&folder.path()).unwrap();
+    let kept = reader.rounds().unwrap();
+    let count = u32::try_from(next.len()).unwrap();
+    assert_eq!(kept.iter().map(|r| (r.number, r.steps)).collect::<Vec<_>>(), [(0, count), (1, 0)]);
+    assert_eq!(kept[0].account, "{\"round\": 0}");
+    assert_eq!(reader.steps().unwrap(), [before, next].concat());
+}
+
+#[test]
 fn another_schema_is_refused() {
     let folder = Folder::new();
     let journal = folder.journal();
     journal.reader().connection().pragma_update(None, "user_version", 99).unwrap();
     drop(journal);
-    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 2 };
+    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 3 };
     assert_eq!(Journal::open(&folder.path()).unwrap_err(), error);
     assert_eq!(Reader::open(&folder.path()).unwrap_err(), error);
 }

@@ -19,6 +19,8 @@ pub(super) struct Course {
     progress: Progress,
     closing: Vec<Step>,
     rig_s_max: f64,
+    // Whether it is decided on the way what is measured.
+    is_open: bool,
     // Run time since which the rig waits for a person.
     waits_since_s: Option<f64>,
 }
@@ -33,6 +35,7 @@ impl Course {
             total: job.done_before + job.steps.len(),
             rig_s: job.session_began_s,
             rest_s: pace.rest_s(job.session_began_s),
+            rest_most_s: None,
         };
         Self {
             rig: Arc::clone(rig),
@@ -40,6 +43,7 @@ impl Course {
             progress,
             closing: closing(&job.steps).to_vec(),
             rig_s_max: job.rig_time_max.map_or(f64::INFINITY, |max| max.as_secs_f64()),
+            is_open: job.decider.is_some(),
             waits_since_s: None,
         }
     }
@@ -53,6 +57,8 @@ impl Course {
     pub(super) fn look(&mut self, now_s: f64) -> Progress {
         self.progress.rig_s = self.progress.rig_s.max(now_s);
         self.progress.rest_s = self.pace.rest_s(self.progress.rig_s);
+        let most_s = (self.rig_s_max - self.progress.rig_s).max(self.progress.rest_s);
+        self.progress.rest_most_s = (self.is_open && most_s.is_finite()).then_some(most_s);
         self.progress
     }
 
@@ -108,8 +114,17 @@ impl Course {
         is_late
     }
 
+    /// These steps follow those that there were.
+    pub(super) fn extend(&mut self, steps: &[Step]) {
+        self.pace.extend(&self.rig, steps);
+        self.progress.total += steps.len();
+        self.closing = closing(steps).to_vec();
+        self.look(self.progress.rig_s);
+    }
+
     /// Only the readings with which the plan closes are still wanted.
     pub(super) fn conclude(&mut self) {
+        self.is_open = false;
         self.pace.conclude(&self.rig, &self.closing);
     }
 }

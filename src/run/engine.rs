@@ -3,6 +3,8 @@
 //! It decides nothing: the machine does. Waiting has an order: what people ask, time-outs, the
 //! device, the journal.
 
+mod deciding;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -11,6 +13,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::clock::RunClock;
 use super::course::Course;
+use super::decider::{Decided, Decider, Next};
 use super::desk::{Desk, Order};
 use super::events::{Happening, Progress};
 use super::hardware::{Hardware, ReachError, Reached};
@@ -21,7 +24,7 @@ use super::rule::{Said, Watch};
 use super::state::{Fault, Outcome, Position, State};
 use crate::device::{DeviceEvent, LinkLost};
 use crate::journal::{self, EventKind, JournalError, Record, Writer};
-use crate::plan::RESUME_IDS_FROM;
+use crate::plan::{RESUME_IDS_FROM, WARM_UP_IDS_FROM};
 use crate::rig::Reading;
 
 /// How often progress is told while the axes move or the detector integrates.
@@ -33,6 +36,7 @@ enum Woken {
     Device(DeviceEvent),
     Rule(Said),
     Journal,
+    Decided(Result<Decided, String>),
 }
 
 pub(super) struct Engine<'a> {
@@ -57,6 +61,7 @@ pub(super) struct Engine<'a> {
     session: u32,
     session_began_s: f64,
     rule: Option<Watch>,
+    decider: Option<Decider>,
     tell_at: tokio::time::Instant,
 }
 
@@ -69,11 +74,12 @@ impl<'a> Engine<'a> {
         journal: Writer,
     ) -> Self {
         let course = Course::new(&hardware.rig, &job);
-        let Job { steps, warm_up, mut check, session, session_began_s, rule, .. } = job;
+        let Job { steps, warm_up, mut check, session, session_began_s, rule, decider, .. } = job;
         let setup =
             Setup { rig: hardware.rig.clone(), home_first: job.home_first, on_fault: job.on_fault };
         let checks = check.as_mut().map(|check| std::mem::take(&mut check.steps));
-        let program = Program { warm_up, checks: checks.unwrap_or_default(), steps };
+        let checks = checks.unwrap_or_default();
+        let program = Program { warm_up, checks, steps, is_open: decider.is_some() };
         Self {
             hardware,
             orders,
@@ -95,6 +101,7 @@ impl<'a> Engine<'a> {
             session,
             session_began_s,
             rule,
+            decider,
             tell_at: tokio::time::Instant::now(),
         }
     }
@@ -112,7 +119,7 @@ impl<'a> Engine<'a> {
             }
             if !self.wants_link {
                 let woken = self.wait().await;
-                self.wake(woken);
+                self.wake(woken).await;
             }
         }
     }
@@ -127,6 +134,7 @@ impl<'a> Engine<'a> {
         let tell_at = self.machine.state().is_active().then_some(self.tell_at);
         let until = until.into_iter().chain(tell_at).min();
         let rule = self.rule.as_mut();
+        let decider = self.decider.as_mut();
         let native = self.hardware.native.as_mut();
         tokio::select! {
             biased;
@@ -146,11 +154,17 @@ impl<'a> Engine<'a> {
                     None => std::future::pending().await,
                 }
             } => Woken::Rule(said),
+            decided = async {
+                match decider {
+                    Some(decider) => decider.answer().await,
+                    None => std::future::pending().await,
+                }
+            } => Woken::Decided(decided),
             Ok(()) = self.committed.changed() => Woken::Journal,
         }
     }
 
-    fn wake(&mut self, woken: Woken) {
+    async fn wake(&mut self, woken: Woken) {
         let now = self.now();
         match woken {
             Woken::Order(order) => self.obey(order),
@@ -162,6 +176,8 @@ impl<'a> Engine<'a> {
             }
             Woken::Rule(said) => self.heed(said),
             Woken::Device(event) => self.hear(event),
+            Woken::Decided(Ok(decided)) => self.decided(decided).await,
+            Woken::Decided(Err(why)) => self.enough(why),
             Woken::Journal => {
                 let failure = self.committed.borrow_and_update().failure.clone();
                 if let Some(failure) = failure {
@@ -313,6 +329,11 @@ impl<'a> Engine<'a> {
                 }
                 Action::AskSource(source) => self.desk.tell(Happening::AskSource(source)),
                 Action::Judge => self.judge(),
+                Action::Decide => {
+                    if let Some(decided) = self.decider.as_mut().and_then(Decider::ask) {
+                        self.decided(decided).await;
+                    }
+                }
                 Action::Reconnect => self.wants_link = true,
                 Action::Finish(outcome) => self.outcome = Some(outcome),
             }
@@ -373,6 +394,9 @@ impl<'a> Engine<'a> {
             self.checked.push(reading.clone());
         }
         self.course.take(&step, end_s);
+        if let Some(decider) = self.decider.as_mut().filter(|_| step.id < WARM_UP_IDS_FROM) {
+            decider.show(&reading);
+        }
         let said = self.rule.as_mut().map_or(Said::Nothing, |rule| rule.show(&reading));
         let here = step.rests_at(&self.hardware.rig);
         let is_late = self.course.is_late(here, &self.machine.steps_ahead());
@@ -386,23 +410,6 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// What the rule says is told, or ends the targets.
-    fn heed(&mut self, said: Said) {
-        match said {
-            Said::Nothing => {}
-            Said::SoFar(text) => self.desk.tell(Happening::Accuracy(text)),
-            Said::Enough(text) => self.conclude(text),
-        }
-    }
-
-    /// A rule of the plan is met.
-    fn conclude(&mut self, rule: String) {
-        self.note(EventKind::Note, &format!("a rule of the plan is met: {rule}"));
-        self.course.conclude();
-        let now = self.now();
-        self.machine.conclude(now, rule);
-    }
-
     /// Run time, seconds.
     fn now_s(&self) -> f64 {
         self.session_began_s + self.clock.now(self.now()) as f64 * 1e-6
@@ -412,22 +419,6 @@ impl<'a> Engine<'a> {
         let progress = self.course.look(self.now_s());
         self.tell_at = tokio::time::Instant::now() + PROGRESS_EVERY;
         self.desk.tell(Happening::Progress(progress));
-    }
-
-    fn judge(&mut self) {
-        let judgement = self.check.as_mut().map(|check| (check.judge)(&self.checked));
-        let go_on = match judgement {
-            None => Ok(()),
-            Some(judgement) => {
-                if let Some(check) = judgement.check {
-                    self.record(Record::ReferenceCheck(check.clone()));
-                    self.desk.tell(Happening::ReferenceCheck(check));
-                }
-                judgement.go_on
-            }
-        };
-        let now = self.now();
-        self.machine.handle(now, Input::Judged(go_on));
     }
 
     fn note(&mut self, kind: EventKind, text: &str) {

@@ -61,6 +61,9 @@ pub struct Progress {
     /// Rig time that is left, seconds, homing included where it is to come: predicted, and scaled
     /// by how the prediction fared so far.
     pub rest_s: f64,
+    /// The same at most, where readings decide on the way what is measured: up to the plan's limit of
+    /// rig time. `None` where all is fixed, or nothing limits it.
+    pub rest_most_s: Option<f64>,
 }
 
 /// Numbers events and hands them to the listeners there are.

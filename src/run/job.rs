@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::decider::Decider;
 use super::hardware::ReachError;
 use super::machine::OnFault;
 use super::rule::Watch;
@@ -54,6 +55,8 @@ pub struct Job {
     pub rig_time_max: Option<Duration>,
     /// Measure no further target once this says so.
     pub rule: Option<Watch>,
+    /// Decides what follows once all steps are measured; without it the run is then complete.
+    pub decider: Option<Decider>,
 }
 
 impl Job {
@@ -70,6 +73,7 @@ impl Job {
             on_fault,
             rig_time_max: None,
             rule: None,
+            decider: None,
         }
     }
 }

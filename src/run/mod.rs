@@ -7,6 +7,7 @@
 mod channels;
 mod clock;
 mod course;
+mod decider;
 mod desk;
 mod engine;
 mod events;
@@ -22,6 +23,7 @@ mod rule;
 mod state;
 mod warm_up;
 
+pub use decider::{Decide, Decided, Decider, Next};
 pub use desk::OwnerStatus;
 pub use events::{Events, Happening, Progress, RunEvent};
 pub use hand::{HandError, Stand, TakeOne};

@@ -72,6 +72,12 @@ impl Pace {
         self.done = 0;
     }
 
+    /// All steps are done, and these follow.
+    pub(super) fn extend(&mut self, rig: &Rig, steps: &[Step]) {
+        self.left = TimeLeft::of(rig, steps);
+        self.done = 0;
+    }
+
     /// Rig time that is left, seconds. Something that takes longer than predicted is always about
     /// to end.
     pub(super) fn rest_s(&self, now_s: f64) -> f64 {

@@ -76,7 +76,7 @@ impl Machine {
             }
             Latch::Open => {}
         }
-        if next == Next::Run && self.work.phase() == Phase::Judging {
+        if next == Next::Run && matches!(self.work.phase(), Phase::Judging | Phase::Deciding) {
             return;
         }
         self.next = None;
@@ -130,8 +130,12 @@ impl Machine {
                     self.work.begin_judging();
                     self.actions.push_back(Action::Judge);
                 }
+                Phase::Steps if self.work.is_open() => {
+                    self.work.begin_deciding();
+                    self.actions.push_back(Action::Decide);
+                }
                 Phase::Steps => self.finish(self.ending.clone()),
-                Phase::Judging | Phase::WarmUp => {}
+                Phase::Deciding | Phase::Judging | Phase::WarmUp => {}
             }
         }
     }

@@ -3,10 +3,11 @@
 
 use std::sync::Arc;
 
-use firmware_protocol::{AxisCounts, Done, Shutter, Sweep, Tick, Window};
+use firmware_protocol::{AxisCounts, AxisMask, Done, Shutter, Sweep, Tick, Window};
 
 use super::*;
-use crate::rig::{Approach, AxisPositions, ReadingKind};
+use crate::plan::Step;
+use crate::rig::{Approach, AxisPositions, ReadingKind, Rig};
 
 pub(super) const QUEUE_DEPTH: usize = 8;
 pub(super) const AXES: AxisMask = AxisMask(0b1111);
@@ -236,6 +237,8 @@ pub(super) struct Bench {
     pub(super) asked: Vec<Source>,
     pub(super) outcome: Option<Outcome>,
     pub(super) reconnects: usize,
+    /// Asked for; whoever tests answers.
+    pub(super) decisions: usize,
     pub(super) is_linked: bool,
     pub(super) verdict: Result<(), String>,
 }
@@ -253,6 +256,7 @@ impl Bench {
             asked: Vec::new(),
             outcome: None,
             reconnects: 0,
+            decisions: 0,
             is_linked: true,
             verdict: Ok(()),
         };
@@ -292,6 +296,7 @@ impl Bench {
                 Action::Became(state) => self.states.push(state),
                 Action::AskSource(source) => self.asked.push(source),
                 Action::Judge => self.machine.handle(NOW, Input::Judged(self.verdict.clone())),
+                Action::Decide => self.decisions += 1,
                 Action::Reconnect => self.reconnects += 1,
                 Action::Finish(outcome) => self.outcome = Some(outcome),
                 Action::Fault(_) | Action::Position(_) => {}

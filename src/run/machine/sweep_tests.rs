@@ -3,7 +3,7 @@
 
 use super::bench_tests::*;
 use super::*;
-use crate::plan::{Swept, WARM_UP_IDS_FROM};
+use crate::plan::{Step, Swept, WARM_UP_IDS_FROM};
 use crate::rig::ReadingKind;
 
 /// Three sweeps of ten windows with a reading at rest between them.
@@ -28,7 +28,7 @@ fn swept_steps() -> Vec<Step> {
 }
 
 fn bench(steps: Vec<Step>, windows: u16, lost: &[u32]) -> Bench {
-    let program = Program { warm_up: None, checks: Vec::new(), steps };
+    let program = Program { steps, ..Program::default() };
     let mut bench = Bench::new(program, OnFault::Wait);
     bench.device.windows = windows;
     bench.device.lost = lost.to_vec();

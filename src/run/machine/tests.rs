@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::bench_tests::*;
 use super::*;
-use crate::plan::{RESUME_IDS_FROM, WARM_UP_IDS_FROM, WarmUp};
+use crate::plan::{RESUME_IDS_FROM, Step, WARM_UP_IDS_FROM, WarmUp};
 use crate::rig::ReadingKind;
 
 fn plain(n: u32) -> Program {

@@ -20,6 +20,8 @@ pub struct Program {
     pub checks: Vec<Step>,
     /// The steps that have no reading yet, in the plan's order.
     pub steps: Vec<Step>,
+    /// Whether somebody decides, once all of them are measured, what follows.
+    pub is_open: bool,
 }
 
 /// In which part of the program the run is.
@@ -30,6 +32,8 @@ pub(super) enum Phase {
     /// The checks are measured, and somebody ponders them.
     Judging,
     Steps,
+    /// All steps that there are so far are measured, and somebody decides which ones follow.
+    Deciding,
 }
 
 /// Whether a reading only serves to see the source become stable.
@@ -61,13 +65,14 @@ pub(super) struct Work {
     closing: Index,
     // Only those are still wanted.
     is_concluded: bool,
+    is_open: bool,
     done: usize,
     total: usize,
 }
 
 impl Work {
     pub(super) fn new(program: Program) -> Self {
-        let Program { warm_up, checks, steps } = program;
+        let Program { warm_up, checks, steps, is_open } = program;
         let (first_step, total) = (checks.len(), steps.len());
         let closing = Index(first_step + total - closing(&steps).len());
         let all: Vec<_> = checks.into_iter().chain(steps).map(|s| (s, false)).collect();
@@ -83,6 +88,7 @@ impl Work {
             phase: Phase::WarmUp,
             closing,
             is_concluded: false,
+            is_open,
             done: 0,
             total,
         };
@@ -115,7 +121,7 @@ impl Work {
             self.all.push((step, false));
         }
         match self.phase {
-            Phase::Judging => None,
+            Phase::Judging | Phase::Deciding => None,
             Phase::WarmUp | Phase::Check | Phase::Steps => self.todo.front().copied(),
         }
     }
@@ -234,6 +240,28 @@ impl Work {
     fn begin_steps(&mut self) {
         self.phase = Phase::Steps;
         self.todo = std::mem::take(&mut self.steps);
+    }
+
+    /// Whether somebody is to decide what follows the last step.
+    pub(super) fn is_open(&self) -> bool {
+        self.is_open && !self.is_concluded
+    }
+
+    pub(super) fn begin_deciding(&mut self) {
+        self.phase = Phase::Deciding;
+    }
+
+    /// These steps follow; they close as the ones before them did.
+    pub(super) fn extend(&mut self, steps: Vec<Step>) {
+        if self.phase != Phase::Deciding {
+            return;
+        }
+        let (first, count) = (self.all.len(), steps.len());
+        self.closing = Index(first + count - closing(&steps).len());
+        self.all.extend(steps.into_iter().map(|step| (step, false)));
+        self.total += count;
+        self.todo = (first..first + count).map(Index).collect();
+        self.phase = Phase::Steps;
     }
 
     /// Whether nothing is left to hand out in this phase.
