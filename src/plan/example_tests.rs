@@ -27,7 +27,8 @@ fn every_example_reads_and_lays_out_on_its_own_rig() {
         let sequence = plan.lay_out(&rig, list.as_ref()).unwrap_or_else(|e| panic!("{e}"));
         let prediction = sequence.prediction;
         let per_reading_s = prediction.total_s() / f64::from(prediction.readings);
-        assert!((0.1..2.0).contains(&per_reading_s), "{}: {prediction:?}", folder.display());
+        // In flight a window takes its own time.
+        assert!((0.02..2.0).contains(&per_reading_s), "{}: {prediction:?}", folder.display());
         names.push(plan.name.unwrap());
     }
     names.sort();

@@ -10,8 +10,8 @@ use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
-    Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop, TARGETS_MAX, Wanted,
-    WarmUp,
+    Adaptive, Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop,
+    TARGETS_MAX, Wanted, WarmUp,
 };
 use crate::rig::Pose;
 
@@ -42,6 +42,8 @@ const PENALTY_STRENGTH: Bounds = Bounds::between(0.0, 1e30);
 /// Targets between dark readings, and between reference readings, where the plan does not say.
 const DARK_EVERY: u32 = 200;
 const REFERENCE_EVERY: u32 = 100;
+/// The same for both within a round of an adaptive schedule.
+const ROUND_EVERY: u32 = 2_000;
 /// A dark and a reference reading integrate this many times as long as a target, where the plan
 /// does not say: their noise enters many targets.
 const DARK_DWELLS: u32 = 4;
@@ -65,10 +67,17 @@ impl Plan {
             read_schedule(root.required_table("schedule")?, &expect)?;
         let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
         let dwell = window.unwrap_or(dwell);
-        let dark = read_dark(root.required_table("dark")?, dwell)?;
-        let reference = read_reference(root.table("reference")?, &region, dwell)?;
+        // Rounds close with both whatever comes between: a sweep alone has a hundred windows.
+        let is_adaptive = matches!(schedule, Schedule::Adaptive(_));
+        let every =
+            if is_adaptive { (ROUND_EVERY, ROUND_EVERY) } else { (DARK_EVERY, REFERENCE_EVERY) };
+        let dark = read_dark(root.required_table("dark")?, dwell, every.0)?;
+        let reference = read_reference(root.table("reference")?, &region, dwell, every.1)?;
         let warm_up = root.table("warm_up")?.map(read_warm_up).transpose()?;
         let stop = root.table("stop")?.map(read_stop).transpose()?.unwrap_or_default();
+        if let Schedule::Adaptive(_) = schedule {
+            Adaptive::check_stop(&root, &stop)?;
+        }
         let fit = root.table("fit")?.map(read_fit).transpose()?.unwrap_or_default();
         let derive = Wanted::read_all(&root, false)?;
         root.finish()?;
@@ -181,7 +190,8 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// low-discrepancy: `count` · list: `file` ·
 /// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_feature_deg`, the full width at half
 /// maximum of the narrowest feature that is looked for (default: `[expect]`'s), or
-/// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`). Sweeps have their own order.
+/// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`). Sweeps have their own order ·
+/// adaptive: see [`Adaptive::read`].
 /// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
 fn read_schedule(
     table: Table<'_>,
@@ -189,6 +199,7 @@ fn read_schedule(
 ) -> Result<(Schedule, Order, u32, Option<Duration>), Problem> {
     #[derive(Clone, Copy)]
     enum Kind {
+        Adaptive,
         CGamma,
         List,
         LowDiscrepancy,
@@ -201,6 +212,7 @@ fn read_schedule(
         ("low-discrepancy", Kind::LowDiscrepancy),
         ("list", Kind::List),
         ("sweep", Kind::Sweep),
+        ("adaptive", Kind::Adaptive),
     ];
     let count = |key: &str| read_count(&table, key, COUNT_MAX);
     let step = |key: &str| table.required_number(key, STEP_DEG);
@@ -220,10 +232,14 @@ fn read_schedule(
         Kind::LowDiscrepancy => Schedule::LowDiscrepancy { count: count("count")? },
         Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
         Kind::Sweep => read_sweep(&table, expect)?,
+        Kind::Adaptive => Schedule::Adaptive(Adaptive::read(&table, expect)?),
     };
-    if let Schedule::Sweep { .. } = schedule {
+    if matches!(schedule, Schedule::Sweep { .. } | Schedule::Adaptive(_)) {
         let window = table.number("window_ms", DWELL_MS)?.map(millis);
-        let repeat = table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole);
+        let repeat = match schedule {
+            Schedule::Sweep { .. } => table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole),
+            _ => 1,
+        };
         table.finish()?;
         return Ok((schedule, Order::Listed, repeat, window));
     }
@@ -259,7 +275,7 @@ fn read_sweep(table: &Table<'_>, expect: &Expect) -> Result<Schedule, Problem> {
 }
 
 /// A step that goes round a whole number of times, so that the last gap equals the others.
-fn read_turn_step(table: &Table<'_>, key: &str) -> Result<f64, Problem> {
+pub(super) fn read_turn_step(table: &Table<'_>, key: &str) -> Result<f64, Problem> {
     let step = table.required_number(key, STEP_DEG)?;
     let steps = 360.0 / step;
     if (steps - libm::round(steps)).abs() <= WHOLE_SLACK * steps {
@@ -283,11 +299,11 @@ fn read_dwell(table: Table<'_>) -> Result<(Duration, Option<String>), Problem> {
 }
 
 /// `[dark]`: `method` shutter or source-off (which asks a person); `every` so many targets
-/// (default 200); `dwell_ms` (default four times a target's).
-fn read_dark(table: Table<'_>, dwell: Duration) -> Result<Dark, Problem> {
+/// (default 200, of an adaptive schedule 2000); `dwell_ms` (default four times a target's).
+fn read_dark(table: Table<'_>, dwell: Duration, every: u32) -> Result<Dark, Problem> {
     let words = [("shutter", DarkMethod::Shutter), ("source-off", DarkMethod::SourceOff)];
     let dark = Dark {
-        every: table.integer("every", 1..=COUNT_MAX)?.map_or(DARK_EVERY, whole),
+        every: table.integer("every", 1..=COUNT_MAX)?.map_or(every, whole),
         dwell: table.number("dwell_ms", DWELL_MS)?.map_or(dwell * DARK_DWELLS, millis),
         method: table.required_choice("method", &words)?,
     };
@@ -296,11 +312,12 @@ fn read_dark(table: Table<'_>, dwell: Duration) -> Result<Dark, Problem> {
 }
 
 /// `[reference]`: `x_mm`, `y_mm` (default: the region's middle), `theta_deg`, `phi_deg` (default
-/// 0); `every` so many targets (default 100); `dwell_ms` (default twice a target's).
+/// 0); `every` so many targets (default 100, of an adaptive schedule 2000); `dwell_ms` (default twice a target's).
 fn read_reference(
     table: Option<Table<'_>>,
     region: &Region,
     dwell: Duration,
+    every: u32,
 ) -> Result<Reference, Problem> {
     let mut reference = Reference {
         pose: Pose {
@@ -309,7 +326,7 @@ fn read_reference(
             theta_rad: 0.0,
             phi_rad: 0.0,
         },
-        every: REFERENCE_EVERY,
+        every,
         dwell: dwell * REFERENCE_DWELLS,
     };
     let Some(table) = table else { return Ok(reference) };
@@ -438,7 +455,7 @@ fn read_rules(table: &Table<'_>) -> Result<Rules, Problem> {
     })
 }
 
-fn read_count(table: &Table<'_>, key: &str, most: i64) -> Result<u32, Problem> {
+pub(super) fn read_count(table: &Table<'_>, key: &str, most: i64) -> Result<u32, Problem> {
     table.required_integer(key, 1..=most).map(whole)
 }
 

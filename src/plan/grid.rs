@@ -30,7 +30,7 @@ pub(super) fn poses(schedule: &Schedule, region: &Region) -> Vec<Pose> {
             tensor(&places, &phis, &thetas(gamma_step_deg, region))
         }
         // Sweeps have their poses from the rig's counts.
-        Schedule::List { .. } | Schedule::Sweep { .. } => Vec::new(),
+        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => Vec::new(),
         Schedule::LowDiscrepancy { count } => (0..count).map(|i| evenly(i, region)).collect(),
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             let places = places(region, x_count, y_count);
@@ -52,7 +52,7 @@ pub(super) fn count(schedule: &Schedule, region: &Region) -> u64 {
         Schedule::CGamma { x_count, y_count, c_step_deg, gamma_step_deg } => {
             grid(x_count, y_count, gamma_step_deg, c_step_deg)
         }
-        Schedule::List { .. } | Schedule::Sweep { .. } => 0,
+        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => 0,
         Schedule::LowDiscrepancy { count } => u64::from(count),
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             grid(x_count, y_count, theta_step_deg, phi_step_deg)

@@ -49,6 +49,13 @@ impl Plan {
             hash.number(warm_up.over.as_secs_f64());
             hash.number(warm_up.timeout.as_secs_f64());
         }
+        if let Some(adaptive) = self.adaptive() {
+            let targets = [adaptive.radiance_relative, adaptive.exitance_relative];
+            for number in targets.map(|target| target.unwrap_or(-1.0)) {
+                hash.number(number);
+            }
+            hash.number(adaptive.narrowest_feature_deg);
+        }
         for step in &sequence.steps {
             hash.step(step);
         }

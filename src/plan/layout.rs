@@ -4,18 +4,16 @@
 //! Everything that a rig can object to is found here, before anything moves.
 
 use std::ops::Range;
-use std::time::Duration;
 
-use firmware_protocol::Shutter;
 use spanned_toml::{Problem, Source};
 
+use super::builder::{Builder, Place, step};
 use super::order::{self, Visit};
-use super::sweep::{self, Line};
 use super::{
-    DarkMethod, Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, Step, Swept,
-    TARGETS_MAX, Target, grid, list,
+    Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, TARGETS_MAX, Target, grid,
+    list, sweep,
 };
-use crate::rig::{AxisPositions, Latched, LimitError, Pose, ReadingKind, Rig};
+use crate::rig::{AxisPositions, LimitError, Pose, ReadingKind, Rig};
 
 /// A list's pose may pass the region's edge by this much: 80° are not exactly 80° in binary.
 const EDGE_SLACK: f64 = 1e-12;
@@ -36,8 +34,12 @@ impl Plan {
         self.check_dwells(rig)?;
         self.check_expected(rig)?;
         let reference = self.reference_on(rig)?;
-        if let Schedule::Sweep { .. } = self.schedule {
-            return self.lay_out_sweeps(rig, gain, reference);
+        match self.schedule {
+            Schedule::Sweep { .. } => return self.lay_out_sweeps(rig, gain, reference),
+            Schedule::Adaptive(adaptive) => {
+                return self.lay_out_first_round(rig, &adaptive, gain, reference);
+            }
+            _ => {}
         }
         let poses = self.poses(list)?;
         self.check_readings(poses.poses.len())?;
@@ -47,7 +49,7 @@ impl Plan {
             Order::Travel => order::travelling(rig, &candidates, reference.positions),
         };
         let targets = targets(&poses.poses, &visits);
-        let mut builder = Builder { plan: self, rig, gain, reference, steps: Vec::new() };
+        let mut builder = Builder::new(self, rig, gain, reference);
         builder.fill(&targets, &visits);
         let prediction = Prediction::of(rig, &targets, &builder.steps);
         let (steps, reference) = (builder.steps, builder.reference);
@@ -59,7 +61,7 @@ impl Plan {
         let lines = sweep::lines(self, rig)?;
         let targets = sweep::targets(rig, &lines);
         self.check_readings(targets.len())?;
-        let mut builder = Builder { plan: self, rig, gain, reference, steps: Vec::new() };
+        let mut builder = Builder::new(self, rig, gain, reference);
         builder.fill_sweeps(&targets, &lines);
         let prediction = Prediction::of(rig, &targets, &builder.steps);
         let (steps, reference) = (builder.steps, builder.reference);
@@ -67,7 +69,7 @@ impl Plan {
         Ok(Sequence { targets, steps, prediction, reference })
     }
 
-    fn gain_on(&self, rig: &Rig) -> Result<u8, Problem> {
+    pub(super) fn gain_on(&self, rig: &Rig) -> Result<u8, Problem> {
         let Some(name) = &self.gain else { return Ok(0) };
         rig.detector.gain_index(name).ok_or_else(|| {
             let names: Vec<String> =
@@ -103,7 +105,7 @@ impl Plan {
         Ok(())
     }
 
-    fn reference_on(&self, rig: &Rig) -> Result<Place, Problem> {
+    pub(super) fn reference_on(&self, rig: &Rig) -> Result<Place, Problem> {
         let pose = self.reference.pose;
         let home = AxisPositions([0.0; 4]);
         let positions = rig.nearest(pose, home).map_err(|e| {
@@ -135,7 +137,7 @@ impl Plan {
         Ok(Poses { poses: grid::poses(&self.schedule, &self.region), places: None })
     }
 
-    fn check_readings(&self, targets: usize) -> Result<(), Problem> {
+    pub(super) fn check_readings(&self, targets: usize) -> Result<(), Problem> {
         let visits = targets as u64 * u64::from(self.repeat);
         let checks = visits / u64::from(self.dark.every) + visits / u64::from(self.reference.every);
         if visits + checks <= u64::from(READINGS_MAX) {
@@ -233,158 +235,4 @@ fn targets(poses: &[Pose], visits: &[Visit]) -> Vec<Target> {
         .collect();
     targets.sort_by_key(|target| target.index);
     targets
-}
-
-/// Where a reading is taken.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    pose: Option<Pose>,
-    positions: AxisPositions,
-    counts: Latched,
-}
-
-/// Puts readings one after the other.
-struct Builder<'p> {
-    plan: &'p Plan,
-    rig: &'p Rig,
-    gain: u8,
-    reference: Place,
-    steps: Vec<Step>,
-}
-
-impl Builder<'_> {
-    /// A dark reading and a reference one; the targets, with more of both between; a reference
-    /// reading and a dark one. Every other repeat runs backwards, which saves the way back.
-    fn fill(&mut self, targets: &[Target], visits: &[Visit]) {
-        self.dark();
-        self.reference();
-        let last = visits.len() as u64 * u64::from(self.plan.repeat);
-        let mut visited = 0;
-        for repeat in 0..self.plan.repeat {
-            for place in 0..visits.len() {
-                let place = if repeat % 2 == 0 { place } else { visits.len() - 1 - place };
-                self.target(&targets[visits[place].target as usize], repeat);
-                visited += 1;
-                if visited % u64::from(self.plan.reference.every) == 0 || visited == last {
-                    self.reference();
-                }
-                if visited % u64::from(self.plan.dark.every) == 0 || visited == last {
-                    self.dark();
-                }
-            }
-        }
-    }
-
-    /// As [`Self::fill`], sweep by sweep: what is due in between comes after a sweep.
-    fn fill_sweeps(&mut self, targets: &[Target], lines: &[Line]) {
-        self.dark();
-        self.reference();
-        let is_due = |before: u64, after: u64, every: u32| {
-            before / u64::from(every) != after / u64::from(every)
-        };
-        let all: u64 = lines.iter().map(|line| u64::from(line.windows)).sum();
-        let last = all * u64::from(self.plan.repeat);
-        let mut visited = 0;
-        for repeat in 0..self.plan.repeat {
-            for place in 0..lines.len() {
-                let line = if repeat % 2 == 0 {
-                    lines[place]
-                } else {
-                    lines[lines.len() - 1 - place].turned(self.rig)
-                };
-                self.windows(targets, &line, repeat);
-                let before = visited;
-                visited += u64::from(line.windows);
-                if is_due(before, visited, self.plan.reference.every) || visited == last {
-                    self.reference();
-                }
-                if is_due(before, visited, self.plan.dark.every) || visited == last {
-                    self.dark();
-                }
-            }
-        }
-    }
-
-    /// The windows of one sweep.
-    fn windows(&mut self, targets: &[Target], line: &Line, repeat: u32) {
-        let first = u32::try_from(self.steps.len()).unwrap_or(u32::MAX);
-        let flight = line.flight;
-        let (travel, lead) = (flight.travel, flight.lead);
-        let swept = Swept { first, count: line.windows.into(), travel, lead };
-        let route = self.rig.flight(flight).ok().map(|motion| {
-            let from = self.steps.last().map_or(Latched::ZERO, |step| step.rests_at(self.rig));
-            self.rig.route_to_flight(from, flight, &motion)
-        });
-        for window in 0..line.windows {
-            let Some(target) = targets.get(line.target(window) as usize) else { continue };
-            let counts = flight.from.plus(travel, window.into());
-            let place = Place { pose: Some(target.pose), positions: target.positions, counts };
-            let kind = ReadingKind::Target { index: target.index, repeat };
-            let id = first + u32::from(window);
-            let (via, settle) = match route.filter(|_| window == 0) {
-                Some(route) => (route.via, route.settle),
-                None => (None, Duration::ZERO),
-            };
-            let step = step(id, kind, place, self.gain, self.plan.dwell);
-            self.steps.push(Step { via, settle, swept: Some(swept), ..step });
-        }
-    }
-
-    fn target(&mut self, target: &Target, repeat: u32) {
-        let positions = target.positions;
-        let counts = self.rig.counts(positions);
-        let place = Place { pose: Some(target.pose), positions, counts };
-        let kind = ReadingKind::Target { index: target.index, repeat };
-        self.push(kind, place, self.plan.dwell);
-    }
-
-    fn reference(&mut self) {
-        self.push(ReadingKind::Reference, self.reference, self.plan.reference.dwell);
-    }
-
-    /// Where the axes stand already; at home to begin with.
-    fn dark(&mut self) {
-        let home = AxisPositions([0.0; 4]);
-        let (positions, counts) = self.steps.last().map_or((home, Latched::ZERO), |step| {
-            if step.swept.is_none() {
-                return (step.positions, step.counts);
-            }
-            let rests = step.rests_at(self.rig);
-            (self.rig.positions(rests), rests)
-        });
-        let place = Place { pose: None, positions, counts };
-        self.push(ReadingKind::Dark, place, self.plan.dark.dwell);
-        if let Some(step) = self.steps.last_mut() {
-            match self.plan.dark.method {
-                DarkMethod::Shutter => step.shutter = Shutter::Closed,
-                DarkMethod::SourceOff => step.source_off = true,
-            }
-        }
-    }
-
-    fn push(&mut self, kind: ReadingKind, place: Place, dwell: Duration) {
-        let from = self.steps.last().map_or(Latched::ZERO, |step| step.rests_at(self.rig));
-        let route = self.rig.route(from, place.counts);
-        // READINGS_MAX is far below 2^32.
-        let id = u32::try_from(self.steps.len()).unwrap_or(u32::MAX);
-        let step = step(id, kind, place, self.gain, dwell);
-        self.steps.push(Step { via: route.via, settle: route.settle, ..step });
-    }
-}
-
-fn step(id: u32, kind: ReadingKind, place: Place, gain: u8, dwell: Duration) -> Step {
-    Step {
-        id,
-        kind,
-        pose: place.pose,
-        positions: place.positions,
-        counts: place.counts,
-        via: None,
-        settle: Duration::ZERO,
-        gain,
-        dwell,
-        shutter: Shutter::Open,
-        source_off: false,
-        swept: None,
-    }
 }

@@ -5,6 +5,10 @@
 //! place and its name. This room reads no clock, does no I/O, and does not know whether hardware
 //! exists.
 
+mod adaptive;
+#[cfg(test)]
+mod adaptive_tests;
+mod builder;
 mod cost;
 #[cfg(test)]
 mod example_tests;
@@ -22,6 +26,7 @@ mod layout_tests;
 mod list;
 mod order;
 mod rewrite;
+mod round;
 mod sequence;
 mod sweep;
 #[cfg(test)]
@@ -30,10 +35,12 @@ mod terms;
 mod tree;
 mod wanted;
 
+pub use adaptive::Adaptive;
 pub use cost::{Prediction, StepTime, TimeLeft};
 pub use expect::Expect;
 pub use hash::PlanHash;
 pub use rewrite::{Change, rewrite};
+pub use round::{After, Meridian, Round, SweepPace};
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};
 pub use terms::{Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, WarmUp};
 pub use wanted::{Asked, Wanted};

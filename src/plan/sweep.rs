@@ -13,7 +13,7 @@ use std::time::Duration;
 use firmware_protocol::{Rejection, WINDOW_WIRE_MAX, WINDOWS_MAX};
 use spanned_toml::Problem;
 
-use super::{Plan, Schedule, TARGETS_MAX, Target, grid};
+use super::{Adaptive, Plan, Schedule, TARGETS_MAX, Target, grid};
 use crate::rig::{Approach, Axis, AxisPositions, Flight, Latched, Rig, forward};
 
 /// The part of the narrowest width that a window goes, at most. It takes ½ (w²/12)/σ² off the top
@@ -35,9 +35,9 @@ pub(super) struct Line {
     pub(super) flight: Flight,
     pub(super) windows: u16,
     /// The target of its lowest window.
-    lowest: u32,
+    pub(super) lowest: u32,
     /// Whether it goes downwards.
-    is_down: bool,
+    pub(super) is_down: bool,
 }
 
 impl Line {
@@ -93,7 +93,7 @@ pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
     };
     check_wire(plan, rig)?;
     let arc = Arc::of(plan, rig, phi_step_deg);
-    let windows = cut(plan, rig, &arc)?;
+    let windows = cut(plan, rig, arc.theta)?;
     let per_meridian: u64 = windows.iter().map(|(_, count)| u64::from(*count)).sum();
     let count = per_meridian * arc.tables.len() as u64 * u64::from(x_count) * u64::from(y_count);
     if count > u64::from(TARGETS_MAX) {
@@ -135,7 +135,7 @@ pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
 }
 
 /// The same windows from the other end.
-fn flipped(line: Line) -> Line {
+pub(super) fn flipped(line: Line) -> Line {
     let Flight { from, travel, .. } = line.flight;
     let flight = Flight {
         from: from.plus(travel, line.windows.into()),
@@ -157,8 +157,7 @@ impl Arc {
         let meridians = libm::round(360.0 / phi_step_deg);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the reader's bounds
         let count = meridians as u32;
-        let reaches = rig.axes[0].check(-most).is_ok();
-        let over_the_top = reaches && count.is_multiple_of(2);
+        let over_the_top = reaches_over(plan, rig) && count.is_multiple_of(2);
         let (theta, count) =
             if over_the_top { ((-most, most), count / 2) } else { ((0.0, most), count) };
         let table = |i: u32| {
@@ -174,6 +173,11 @@ impl Arc {
     }
 }
 
+/// Whether the arm reaches both sides of the zenith.
+pub(super) fn reaches_over(plan: &Plan, rig: &Rig) -> bool {
+    rig.axes[0].check(-plan.region.theta_max_rad).is_ok()
+}
+
 /// Rows of places, back and forth.
 fn places(plan: &Plan, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
     let mut places = grid::places(&plan.region, x_count, y_count);
@@ -186,17 +190,18 @@ fn places(plan: &Plan, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
 }
 
 /// The windows along the arc: upwards, in as many flights as a device can keep windows of.
-fn cut(plan: &Plan, rig: &Rig, arc: &Arc) -> Result<Vec<(Flight, u16)>, Problem> {
-    let Schedule::Sweep { speed_deg_per_s: pinned, .. } = plan.schedule else {
-        return Ok(Vec::new());
-    };
-    let axis = &rig.axes[0];
+pub(super) fn cut(
+    plan: &Plan,
+    rig: &Rig,
+    theta: (f64, f64),
+) -> Result<Vec<(Flight, u16)>, Problem> {
+    let (axis, pinned) = (&rig.axes[0], pinned_speed(plan));
     let mut travel = match pinned {
         Some(speed_deg_per_s) => pinned_travel(plan, rig, speed_deg_per_s)?,
         None => free_travel(plan, rig),
     };
     loop {
-        let flights = cut_by(plan, rig, axis, arc, travel);
+        let flights = cut_by(plan, rig, theta, travel);
         let refused = flights.iter().find_map(|(flight, _)| {
             let up = rig.flight(*flight).err();
             let line = Line { flight: *flight, windows: flight.windows, lowest: 0, is_down: false };
@@ -217,8 +222,9 @@ fn slower(travel: i32) -> i32 {
     ((f64::from(travel) * SLOWER) as i32).max(1)
 }
 
-fn cut_by(plan: &Plan, rig: &Rig, axis: &Axis, arc: &Arc, travel: i32) -> Vec<(Flight, u16)> {
-    let (low, high) = (axis.counts(arc.theta.0), axis.counts(arc.theta.1));
+fn cut_by(plan: &Plan, rig: &Rig, theta: (f64, f64), travel: i32) -> Vec<(Flight, u16)> {
+    let axis = &rig.axes[0];
+    let (low, high) = (axis.counts(theta.0), axis.counts(theta.1));
     let span = high.saturating_sub(low).max(1);
     let travel = travel.min(span);
     // As many windows as cover the arc, each a whole number of counts, none longer.
@@ -289,7 +295,11 @@ fn pinned_travel(plan: &Plan, rig: &Rig, speed_deg_per_s: f64) -> Result<i32, Pr
 
 /// As far as the narrowest feature bears, or the axis can.
 fn free_travel(plan: &Plan, rig: &Rig) -> i32 {
-    let Schedule::Sweep { narrowest_feature_deg, .. } = plan.schedule else { return 1 };
+    let narrowest_feature_deg = match plan.schedule {
+        Schedule::Sweep { narrowest_feature_deg, .. } => narrowest_feature_deg,
+        Schedule::Adaptive(Adaptive { narrowest_feature_deg, .. }) => Some(narrowest_feature_deg),
+        _ => return 1,
+    };
     let detector = &rig.detector;
     let sigma =
         libm::hypot(detector.pupil_radius_m, detector.spot_radius_m) / (2.0 * detector.distance_m);
@@ -300,6 +310,13 @@ fn free_travel(plan: &Plan, rig: &Rig) -> i32 {
     whole(axis, (PART_OF_NARROWEST * seen).min(fastest)).max(1)
 }
 
+fn pinned_speed(plan: &Plan) -> Option<f64> {
+    match plan.schedule {
+        Schedule::Sweep { speed_deg_per_s, .. } => speed_deg_per_s,
+        _ => None,
+    }
+}
+
 /// Whole counts, none too many.
 #[allow(clippy::cast_possible_truncation)] // saturates
 fn whole(axis: &Axis, units: f64) -> i32 {
@@ -307,7 +324,7 @@ fn whole(axis: &Axis, units: f64) -> i32 {
 }
 
 /// Windows must not come faster than the wire takes them.
-fn check_wire(plan: &Plan, rig: &Rig) -> Result<(), Problem> {
+pub(super) fn check_wire(plan: &Plan, rig: &Rig) -> Result<(), Problem> {
     let per_s = 1.0 / window_s(rig, plan.dwell);
     let carried =
         PART_OF_WIRE * f64::from(rig.link.baud()) / BITS_PER_BYTE / WINDOW_WIRE_MAX as f64;
@@ -333,7 +350,7 @@ fn check_wire(plan: &Plan, rig: &Rig) -> Result<(), Problem> {
 }
 
 /// Every sweep can be flown where it is, by the rule that the device follows.
-fn check_places(plan: &Plan, rig: &Rig, lines: &[Line]) -> Result<(), Problem> {
+pub(super) fn check_places(plan: &Plan, rig: &Rig, lines: &[Line]) -> Result<(), Problem> {
     for line in lines {
         let at = rig.positions(line.flight.from);
         for (axis, position) in rig.axes.iter().zip(at.0).skip(1) {
@@ -364,8 +381,7 @@ fn no_room(plan: &Plan, axis: &Axis, rejection: Rejection) -> Problem {
         ),
         other => format!("the sweep can't be flown: {other:?}"),
     };
-    let pinned = matches!(plan.schedule, Schedule::Sweep { speed_deg_per_s: Some(_), .. });
-    let key = if pinned { "speed_deg_per_s" } else { "kind" };
+    let key = if pinned_speed(plan).is_some() { "speed_deg_per_s" } else { "kind" };
     plan.problem(
         "schedule",
         key,

@@ -7,7 +7,7 @@ use std::time::Duration;
 use fit::{Outline, Wish};
 use spanned_toml::Document;
 
-use super::{Expect, Wanted};
+use super::{Adaptive, Expect, Wanted};
 use crate::rig::Pose;
 
 /// A plan as its file states it.
@@ -64,6 +64,8 @@ pub struct Region {
 /// Which poses are the targets.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Schedule {
+    /// Sweeps that the readings so far decide upon.
+    Adaptive(Adaptive),
     /// C-planes and γ: γ = θ, C = -φ modulo 360°.
     CGamma {
         /// Columns of places on the sample.
@@ -176,6 +178,14 @@ impl Plan {
     /// The file that it was read from.
     pub fn document(&self) -> &Document {
         &self.document
+    }
+
+    /// The terms of a schedule that readings decide upon; `None` for those that are fixed beforehand.
+    pub fn adaptive(&self) -> Option<&Adaptive> {
+        match &self.schedule {
+            Schedule::Adaptive(adaptive) => Some(adaptive),
+            _ => None,
+        }
     }
 
     /// The CSV of poses that the schedule refers to, as the plan names it.

@@ -67,6 +67,9 @@ pub enum ForecastError {
         /// Coefficients of the fit.
         coefficients: usize,
     },
+    /// Nobody knows yet what will be measured.
+    #[error("readings decide what is measured, until the plan's target is met")]
+    Open,
     /// The plan's readings can't be calibrated.
     #[error("{0}")]
     Calibration(String),
@@ -76,6 +79,9 @@ impl Forecast {
     /// Of a plan laid out on a rig. Where the plan leaves the basis to the readings, in Zernike
     /// polynomials of the highest even degree up to 12 that its poses determine.
     pub fn of(plan: &Plan, rig: &Rig, sequence: &Sequence) -> Result<Self, ForecastError> {
+        if plan.adaptive().is_some() {
+            return Err(ForecastError::Open);
+        }
         if let Some(model) = plan.fit.decided() {
             return Self::in_model(plan, rig, sequence, model);
         }

@@ -3,7 +3,7 @@
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::time::Duration;
 
-use crate::plan::{Change, Plan, Schedule, Stop};
+use crate::plan::{Adaptive, Change, Plan, Schedule, Stop};
 
 /// A rung of the ladder: how a plan's density, dwell and speed are scaled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,10 +45,11 @@ impl Rung {
         }
         let dwell_ms = wanted.dwell.as_secs_f64() * 1e3;
         changes.push(Change::set("dwell", "dwell_ms", dwell_ms));
-        changes.extend(
-            [("schedule", "window_ms"), ("stop", "exitance_relative"), ("stop", "rig_time_s_max")]
-                .map(|(table, key)| Change::remove(table, key)),
-        );
+        let gone =
+            [("schedule", "window_ms"), ("stop", "exitance_relative"), ("stop", "rig_time_s_max")];
+        let is_kept = |key: &str| key == "rig_time_s_max" && plan.adaptive().is_some();
+        let gone = gone.into_iter().filter(|(_, key)| !is_kept(key));
+        changes.extend(gone.map(|(table, key)| Change::remove(table, key)));
         let found = plan.changed(&changes)?;
         // A text that could not be changed is read as it was.
         let is_wanted = found.schedule == wanted.schedule
@@ -106,6 +107,12 @@ impl Rung {
                 narrowest_feature_deg: narrowest_feature_deg
                     .map(|width| finer_step(width * self.speed)),
             },
+            // An error so many times smaller, as if by noise alone.
+            Schedule::Adaptive(adaptive) => Schedule::Adaptive(Adaptive {
+                radiance_relative: adaptive.radiance_relative.map(|error| error / finer),
+                exitance_relative: adaptive.exitance_relative.map(|error| error / finer),
+                ..adaptive
+            }),
             list @ Schedule::List { .. } => list,
         };
         if plan.list_file().is_none() {
@@ -114,7 +121,11 @@ impl Rung {
         }
         plan.dwell = whole_micros(plan.dwell.mul_f64(self.dwell));
         // What a rung is compared by is what its rules would have ended it by.
-        plan.stop = Stop::default();
+        plan.stop = Stop {
+            exitance_relative: None,
+            // Where readings decide there is nothing else that ends a run in any case.
+            rig_time_max: plan.stop.rig_time_max.filter(|_| plan.adaptive().is_some()),
+        };
         plan
     }
 
@@ -144,6 +155,11 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
                 narrowest_feature_deg.map(|narrowest| set("narrowest_feature_deg", narrowest)),
             );
             changes
+        }
+        Schedule::Adaptive(Adaptive { radiance_relative, exitance_relative, .. }) => {
+            let radiance = radiance_relative.map(|error| set("radiance_relative", error));
+            let exitance = exitance_relative.map(|error| set("exitance_relative", error));
+            radiance.into_iter().chain(exitance).collect()
         }
         Schedule::List { .. } => Vec::new(),
     }

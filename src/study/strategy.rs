@@ -10,6 +10,8 @@ pub enum Strategy {
     StopAndGo,
     /// In windows while the arm flies along a meridian.
     Sweep,
+    /// In sweeps that the readings so far decide upon.
+    Adaptive,
 }
 
 /// Meridians where neither the plan's grid nor its fit says how many.
@@ -17,21 +19,27 @@ const PHI_STEP_DEG: f64 = 15.0;
 /// Columns and rows of places where the plan pins no degree in position.
 const PLACES: usize = 2;
 
+/// What is asked of readings that decide, and how long they may take, where the plan doesn't say.
+const RADIANCE_RELATIVE: f64 = 0.02;
+const RIG_TIME_S: f64 = 7200.0;
+
 impl Strategy {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::StopAndGo, Self::Sweep];
+    pub const ALL: [Self; 3] = [Self::StopAndGo, Self::Sweep, Self::Adaptive];
 
     /// As frontier.csv and the command line say it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::StopAndGo => "stop-and-go",
             Self::Sweep => "sweep",
+            Self::Adaptive => "adaptive",
         }
     }
 
     /// The one of a schedule.
     pub fn of(schedule: &Schedule) -> Self {
         match schedule {
+            Schedule::Adaptive(_) => Self::Adaptive,
             Schedule::Sweep { .. } => Self::Sweep,
             Schedule::CGamma { .. }
             | Schedule::List { .. }
@@ -45,12 +53,16 @@ impl Strategy {
     ///
     /// Sweeps take the meridians and the places of a grid; where the schedule has none, as many as
     /// the fit's degrees need. A grid takes the sweeps' meridians and places, and two circles within
-    /// the narrowest feature.
+    /// the narrowest feature. An adaptive plan takes the places of either, and asks for 2 % of the
+    /// radiance.
     pub fn changes(self, plan: &Plan) -> Option<Vec<Change>> {
         match (Self::of(&plan.schedule), self) {
-            (Self::StopAndGo, Self::StopAndGo) | (Self::Sweep, Self::Sweep) => Some(Vec::new()),
+            (from, to) if from == to => Some(Vec::new()),
             (Self::StopAndGo, Self::Sweep) => sweeps(plan),
             (Self::Sweep, Self::StopAndGo) => grid(plan),
+            (Self::StopAndGo | Self::Sweep, Self::Adaptive) => adaptive(plan),
+            // An error to reach does not say how fine a grid is.
+            _ => None,
         }
     }
 }
@@ -71,7 +83,7 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
             let step = plan.fit.angular_degree.map_or(PHI_STEP_DEG, step);
             ((places, places), step, step)
         }
-        Schedule::List { .. } | Schedule::Sweep { .. } => return None,
+        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => return None,
     };
     // What the grid resolves where the plan doesn't say what there is to resolve.
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
@@ -84,6 +96,45 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
     changes.push(Change::set("schedule", "y_count", places.1));
     changes.push(Change::set("schedule", "phi_step_deg", phi_step_deg));
     changes.push(Change::set("schedule", "narrowest_feature_deg", narrowest_feature_deg));
+    Some(changes)
+}
+
+/// The places of a grid or of sweeps, and the narrowest feature that they resolve; as long as it takes,
+/// within reason.
+fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
+    let flown = match Strategy::of(&plan.schedule) {
+        Strategy::Sweep => plan.clone(),
+        _ => plan.changed(&sweeps(plan)?)?,
+    };
+    let Schedule::Sweep { x_count, y_count, phi_step_deg, narrowest_feature_deg, .. } =
+        flown.schedule
+    else {
+        return None;
+    };
+    let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
+    let narrowest_feature_deg = declared.or(narrowest_feature_deg).unwrap_or(phi_step_deg);
+    let mut changes: Vec<Change> = [
+        "count",
+        "theta_step_deg",
+        "gamma_step_deg",
+        "c_step_deg",
+        "phi_step_deg",
+        "speed_deg_per_s",
+        "order",
+        "repeat",
+    ]
+    .into_iter()
+    .map(|key| Change::remove("schedule", key))
+    .collect();
+    changes.push(Change::remove("stop", "exitance_relative"));
+    changes.push(Change::set("schedule", "kind", "\"adaptive\""));
+    changes.push(Change::set("schedule", "x_count", x_count));
+    changes.push(Change::set("schedule", "y_count", y_count));
+    changes.push(Change::set("schedule", "narrowest_feature_deg", narrowest_feature_deg));
+    changes.push(Change::set("schedule", "radiance_relative", RADIANCE_RELATIVE));
+    if plan.stop.rig_time_max.is_none() {
+        changes.push(Change::set("stop", "rig_time_s_max", RIG_TIME_S));
+    }
     Some(changes)
 }
 
@@ -149,6 +200,20 @@ mod tests {
             panic!("a sweep");
         };
         assert_eq!((x_count, y_count, phi_step_deg), (3, 3, 20.0));
+    }
+
+    #[test]
+    fn a_grid_that_readings_decide_upon_keeps_its_places_and_its_narrowest_feature() {
+        let raster = plan(
+            "kind = \"raster\"\nx_count = 2\ny_count = 3\ntheta_step_deg = 5\nphi_step_deg = 30\n\
+             order = \"listed\"\nrepeat = 2",
+        );
+        let changed = raster.changed(&Strategy::Adaptive.changes(&raster).unwrap()).unwrap();
+        let adaptive = changed.adaptive().unwrap();
+        assert_eq!((adaptive.x_count, adaptive.y_count), (2, 3));
+        assert!((adaptive.narrowest_feature_deg - 10.0).abs() < 1e-12);
+        assert!(changed.stop.rig_time_max.is_some());
+        assert_eq!(Strategy::Sweep.changes(&changed), None);
     }
 
     #[test]
