@@ -2,6 +2,7 @@
 //! which plans to compare, what accuracy costs in time, whether stated uncertainties hold. It is
 //! handed what runs found; it does not know clocks or files.
 
+pub mod adaptive;
 pub mod coverage;
 mod demand;
 mod forecast;

@@ -1,0 +1,400 @@
+//! What a run measures next, decided by what it measured so far: sweeps where the field is least
+//! known, per second of rig time; checks that the fit has not seen; and when it is enough.
+//!
+//! A pure function of the plan, the rig and the readings: no clock, no dice, nothing of what is true.
+//! Readings that are the same decide the same.
+
+mod between;
+mod checked;
+mod gaps;
+mod scans;
+
+use std::collections::BTreeSet;
+
+use fit::{Optics, Region};
+use serde::{Deserialize, Serialize};
+
+use crate::plan::{Adaptive, After, Meridian, Plan, Prediction, Step, StepTime, SweepPace};
+use crate::rig::calibration::{Calibrated, calibrate};
+use crate::rig::{AxisPositions, Latched, Reading, Rig};
+use between::Between;
+use checked::{Checked, checked};
+use scans::{Scan, scans};
+
+pub use gaps::Gaps;
+
+/// A round takes this part of the time so far ...
+const GROWTH: f64 = 0.35;
+/// ... and this many whole sweeps at least.
+const SWEEPS_LEAST: f64 = 4.0;
+/// One check for so many other sweeps of a round.
+const SWEEPS_PER_CHECK: usize = 4;
+/// Checks at most: their names are known by where they are.
+const CHECKS_MAX: u32 = 400;
+/// Sweeps that are decided upon at most; the decision's time grows with their cube.
+const SWEEPS_MAX: usize = 300;
+/// The fit is asked once the interpolation's own error is no more than this many times the target.
+const FIT_FROM: f64 = 1.5;
+/// A fit that stays this far above what lies between the sweeps can't follow them ...
+const STUCK: f64 = 2.0;
+/// ... if a round did not bring its error down to this part.
+const STUCK_GAIN: f64 = 0.9;
+
+/// What a decision rests on beside the readings.
+#[derive(Debug, Clone)]
+pub struct Terms<'a> {
+    /// The plan, whose schedule is an adaptive one.
+    pub plan: &'a Plan,
+    /// Its terms.
+    pub adaptive: &'a Adaptive,
+    /// The rig.
+    pub rig: &'a Rig,
+    /// What the fit stands for.
+    pub region: Region,
+    /// What the detector sees.
+    pub optics: Option<Optics>,
+    pace: SweepPace,
+}
+
+/// What was found after a round.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Account {
+    /// The round, from 1.
+    pub round: u32,
+    /// Sweeps so far.
+    pub sweeps: usize,
+    /// Of them, those that serve as checks.
+    pub checks: usize,
+    /// Rig time so far, predicted, homing apart.
+    pub rig_s: f64,
+    /// Error expected between the sweeps, relative RMS, from each of them left out in turn.
+    pub between_relative: Option<f64>,
+    /// Error of a fit of all sweeps but the checks, found by the checks; `None` where it was not
+    /// asked.
+    pub checked_relative: Option<f64>,
+    /// What that is below with a confidence of 90 %.
+    pub checked_upper_relative: Option<f64>,
+    /// Noise of one reading, relative to the radiance's RMS.
+    pub noise_relative: Option<f64>,
+    /// The exitance's combined uncertainty, where the plan asks for it.
+    pub exitance_u_relative: Option<f64>,
+    /// What has not been looked at.
+    pub gaps: Gaps,
+    /// How it ended; `None` while it goes on.
+    pub verdict: Option<Verdict>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Whether all targets were met.
+    pub is_met: bool,
+    /// One sentence.
+    pub why: String,
+    /// The largest part of the error that is left, and how large it is.
+    pub largest: Option<(String, f64)>,
+}
+
+/// What follows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Choice {
+    /// These sweeps.
+    Measure(Vec<Meridian>),
+    /// Nothing.
+    Enough,
+}
+
+impl<'a> Terms<'a> {
+    /// `None` for plans whose schedule is fixed beforehand, or can't be flown at all.
+    pub fn new(
+        plan: &'a Plan,
+        rig: &'a Rig,
+        region: Region,
+        optics: Option<Optics>,
+    ) -> Option<Self> {
+        let pace = plan.sweep_pace(rig).ok()?;
+        Some(Self { plan, adaptive: plan.adaptive()?, rig, region, optics, pace })
+    }
+
+    fn check(&self, j: u32) -> Meridian {
+        self.adaptive.check(self.plan, self.rig, j)
+    }
+
+    /// Where a sweep is, by the counts of turntable and stage: as a round lays it out, the table may
+    /// stand half turns off.
+    fn stands(&self, meridian: &Meridian) -> [[i32; 3]; 4] {
+        [0.0, -1.0, -2.0, 1.0].map(|half_turns| {
+            let phi = meridian.phi_rad + half_turns * core::f64::consts::PI;
+            let at = AxisPositions([0.0, phi, meridian.x_m, meridian.y_m]);
+            let [_, phi, x, y] = self.rig.counts(at).0;
+            [phi, x, y]
+        })
+    }
+
+    /// The next checks that have not been flown.
+    fn further_checks(&self, steps: &[Step], count: usize) -> Vec<Meridian> {
+        let had: BTreeSet<[i32; 3]> = steps
+            .iter()
+            .map(|step| {
+                let [_, phi, x, y] = step.counts.0;
+                [phi, x, y]
+            })
+            .collect();
+        let is_new = |check: &Meridian| !self.stands(check).iter().any(|at| had.contains(at));
+        (0..CHECKS_MAX).map(|j| self.check(j)).filter(is_new).take(count).collect()
+    }
+
+    /// Where all checks are.
+    fn checks(&self) -> BTreeSet<[i32; 3]> {
+        (0..CHECKS_MAX).flat_map(|j| self.stands(&self.check(j))).collect()
+    }
+}
+
+/// Decides. `readings` are those of the run's `steps`, in any order; `before` what was found after
+/// the rounds before, in order.
+pub fn decide(
+    terms: &Terms<'_>,
+    steps: &[Step],
+    readings: &[Reading],
+    before: &[Account],
+) -> (Account, Choice) {
+    let mut readings = readings.to_vec();
+    readings.sort_by_key(|reading| reading.id);
+    let round = u32::try_from(before.len()).unwrap_or(u32::MAX);
+    let rig_s = time_of(terms.rig, steps);
+    let calibrated = match calibrate(terms.rig, &readings) {
+        Ok(calibrated) => calibrated,
+        Err(error) => return nothing(terms, round, rig_s, &error.to_string()),
+    };
+    let scans = scans(terms, steps, &calibrated);
+    let Some(between) = Between::new(terms, &scans, round) else {
+        return nothing(terms, round, rig_s, "the sweeps so far show no light");
+    };
+    let mut account = Account {
+        round: round + 1,
+        sweeps: scans.len(),
+        checks: scans.iter().filter(|scan| scan.is_check).count(),
+        rig_s,
+        between_relative: Some(between.relative()),
+        checked_relative: None,
+        checked_upper_relative: None,
+        noise_relative: Some(between.noise_relative()),
+        exitance_u_relative: None,
+        gaps: Gaps::of(terms, &scans),
+        verdict: None,
+    };
+    let mut state =
+        State { terms, calibrated: &calibrated, scans: &scans, between, before, whole: None };
+    let choice = state.judge(&mut account, steps);
+    (account, choice)
+}
+
+struct State<'s> {
+    terms: &'s Terms<'s>,
+    calibrated: &'s Calibrated,
+    scans: &'s [Scan],
+    between: Between,
+    before: &'s [Account],
+    /// The fit of all readings, once it was asked for.
+    whole: Option<fit::Fit>,
+}
+
+impl State<'_> {
+    fn judge(&mut self, account: &mut Account, steps: &[Step]) -> Choice {
+        let asked = self.terms.adaptive.radiance_relative;
+        let close = asked.is_none_or(|asked| self.between.relative() <= FIT_FROM * asked);
+        if close {
+            self.ask_fit(account);
+        }
+        let mut ending = self.met(account).or_else(|| self.hopeless(account));
+        if ending.is_none() {
+            let wanted = self.next(steps);
+            match wanted {
+                Ok(wanted) => return Choice::Measure(wanted),
+                Err(why) => {
+                    // What a person wants to know at the end, whatever it costs.
+                    if account.checked_relative.is_none() {
+                        self.ask_fit(account);
+                    }
+                    let largest = largest(account);
+                    ending = self.met(account).or(Some(Verdict { is_met: false, why, largest }));
+                }
+            }
+        }
+        account.verdict = ending;
+        Choice::Enough
+    }
+
+    /// What the checks, and the exitance's own uncertainty, say of a fit.
+    fn ask_fit(&mut self, account: &mut Account) {
+        if self.terms.adaptive.radiance_relative.is_some() {
+            let mean_square = self.between.mean_square();
+            // A fit that is refused says nothing yet; more sweeps determine it.
+            let found = checked(self.terms, self.calibrated, self.scans, mean_square);
+            if let Ok(Some(Checked { relative, upper_relative })) = found {
+                account.checked_relative = Some(relative);
+                account.checked_upper_relative = Some(upper_relative);
+            }
+        }
+        if self.terms.adaptive.exitance_relative.is_some() {
+            let Terms { plan, region, optics, .. } = self.terms;
+            let whole = self.calibrated.fit(region, &plan.fit, optics.as_ref());
+            self.whole = whole.ok().map(|fitted| fitted.fit);
+            let exitance = self.whole.as_ref().map(fit::Fit::exitance);
+            let lit = exitance.filter(|exitance| exitance.value > 0.0);
+            account.exitance_u_relative = lit.map(|exitance| exitance.u / exitance.value);
+        }
+    }
+
+    /// The verdict on targets that are met, both of them if there are two.
+    fn met(&self, account: &Account) -> Option<Verdict> {
+        let mut said = Vec::new();
+        if let Some(asked) = self.terms.adaptive.radiance_relative {
+            let upper = account.checked_upper_relative?.max(account.between_relative?);
+            if upper > asked {
+                return None;
+            }
+            said.push(format!(
+                "radiance to {} by the checks (below {} with 90 % confidence) and {} by what lies \
+                 between the sweeps, asked {}",
+                percent(account.checked_relative?),
+                percent(account.checked_upper_relative?),
+                percent(account.between_relative?),
+                percent(asked)
+            ));
+        }
+        if let Some(asked) = self.terms.adaptive.exitance_relative {
+            let u = account.exitance_u_relative?;
+            if u > asked {
+                return None;
+            }
+            said.push(format!("exitance to {}, asked {}", percent(u), percent(asked)));
+        }
+        let Account { round, sweeps, .. } = account;
+        let why = format!("{} after {sweeps} sweeps in {round} rounds", said.join(", "));
+        Some(Verdict { is_met: true, why, largest: None })
+    }
+
+    /// The verdict on targets that more sweeps won't meet.
+    fn hopeless(&self, account: &Account) -> Option<Verdict> {
+        let not_met = |why: String, largest| Some(Verdict { is_met: false, why, largest });
+        if let Some(asked) = self.terms.adaptive.exitance_relative
+            && let Some((name, shared)) = self.shared()
+            && shared > asked
+        {
+            let why = format!(
+                "exitance to {} can't be reached: what all readings share is {}",
+                percent(asked),
+                percent(shared)
+            );
+            return not_met(why, Some((name, shared)));
+        }
+        let asked = self.terms.adaptive.radiance_relative?;
+        let (checked, between) = (account.checked_relative?, account.between_relative?);
+        let last = self.before.last().and_then(|account| account.checked_relative)?;
+        let is_stuck = checked > asked
+            && between <= asked
+            && checked > STUCK * between
+            && checked > STUCK_GAIN * last;
+        if !is_stuck {
+            return None;
+        }
+        let why = format!(
+            "radiance to {} can't be reached by more sweeps: the fit's functions stay {} off",
+            percent(asked),
+            percent(checked)
+        );
+        not_met(why, largest(account))
+    }
+
+    /// The exitance's uncertainty by what all readings share, and the largest part of it.
+    fn shared(&self) -> Option<(String, f64)> {
+        let fit = self.whole.as_ref()?;
+        let value = fit.exitance().value;
+        let parts = fit.contributions();
+        let shared = parts.iter().skip(1);
+        let square: f64 = shared.clone().map(|part| part.u * part.u).sum();
+        let largest = shared.max_by(|a, b| a.u.total_cmp(&b.u))?;
+        (value > 0.0).then(|| (largest.name.clone(), libm::sqrt(square) / value))
+    }
+
+    /// The next round, or why there is none.
+    fn next(&mut self, steps: &[Step]) -> Result<Vec<Meridian>, String> {
+        let terms = self.terms;
+        if self.scans.len() >= SWEEPS_MAX {
+            return Err(format!("{} sweeps are as many as are decided upon", self.scans.len()));
+        }
+        let after = After::steps(terms.rig, steps);
+        let so_far_s = time_of(terms.rig, steps);
+        let most = terms.plan.stop.rig_time_max.map_or(f64::INFINITY, |most| most.as_secs_f64());
+        let left_s = most - Prediction::homing_s_of(terms.rig) - so_far_s;
+        let span_rad = 2.0 * terms.plan.region.theta_max_rad;
+        let sweep_s = terms.pace.around_s + span_rad * terms.pace.seconds_per_rad;
+        let wanted_s = (GROWTH * so_far_s).max(SWEEPS_LEAST * sweep_s).min(left_s);
+        // Of a round's time a part goes to checks, which are whole sweeps.
+        let part = 1.0 / (SWEEPS_PER_CHECK as f64 + 1.0);
+        let mut chosen = self.between.choose(terms, after.here, wanted_s * (1.0 - part));
+        let mut checks = terms.further_checks(steps, (chosen.len() / SWEEPS_PER_CHECK).max(1));
+        while !(chosen.is_empty() && checks.is_empty()) {
+            let wanted: Vec<Meridian> = chosen.iter().chain(&checks).copied().collect();
+            match terms.plan.lay_out_round(terms.rig, after, &wanted) {
+                Ok(round) if round.seconds <= left_s => return Ok(wanted),
+                Ok(_) => {}
+                Err(problem) => return Err(format!("the rig can't fly what is wanted: {problem}")),
+            }
+            if chosen.pop().is_none() {
+                checks.pop();
+            }
+        }
+        Err("the plan's time is used up".to_owned())
+    }
+}
+
+/// The largest part of the radiance's error.
+fn largest(account: &Account) -> Option<(String, f64)> {
+    let between = account.between_relative?;
+    let checked = account.checked_relative.unwrap_or(0.0);
+    let beyond = libm::sqrt((checked * checked - between * between).max(0.0));
+    Some(if beyond > between {
+        ("what the fit's functions can't follow".to_owned(), beyond)
+    } else {
+        ("what lies between the sweeps".to_owned(), between)
+    })
+}
+
+/// Nothing can be decided.
+fn nothing(terms: &Terms<'_>, round: u32, rig_s: f64, why: &str) -> (Account, Choice) {
+    let account = Account {
+        round: round + 1,
+        sweeps: 0,
+        checks: 0,
+        rig_s,
+        between_relative: None,
+        checked_relative: None,
+        checked_upper_relative: None,
+        noise_relative: None,
+        exitance_u_relative: None,
+        gaps: Gaps::of(terms, &[]),
+        verdict: Some(Verdict {
+            is_met: false,
+            why: format!("nothing can be decided: {why}"),
+            largest: None,
+        }),
+    };
+    (account, Choice::Enough)
+}
+
+/// Of steps that begin at home.
+fn time_of(rig: &Rig, steps: &[Step]) -> f64 {
+    let mut here = Latched::ZERO;
+    let mut seconds = 0.0;
+    for step in steps {
+        seconds += StepTime::of(rig, here, step).total_s();
+        here = step.rests_at(rig);
+    }
+    seconds
+}
+
+fn percent(part: f64) -> String {
+    format!("{:.3} %", 100.0 * part)
+}
