@@ -188,6 +188,7 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         truth: results.truth,
         independent: &results.independent,
         derived: &results.derived,
+        rounds: &setup.accounts,
     };
     show(args, rays, &file, Some(&path))
 }
@@ -245,6 +246,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         truth: None,
         independent: &[],
         derived: &derived,
+        rounds: &[],
     };
     if let Some(path) = &args.picture {
         picture::write(path, fit, input.quantity, &samples)?;
@@ -292,6 +294,7 @@ fn fit_stream(
         truth: None,
         independent: &[],
         derived: &derived,
+        rounds: &[],
     };
     write_and_show(args, rays, &file)
 }

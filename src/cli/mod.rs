@@ -2,6 +2,7 @@
 //! where a simulated rig is put together; after it there are types.
 
 mod acquire;
+mod adapting;
 mod args;
 pub mod calc;
 mod chart;

@@ -28,6 +28,8 @@ pub(crate) fn warning(outlook: &Result<Forecast, ForecastError>) -> Option<Strin
 
 /// The same for who is about to run the plan: whether its fit will be refused, and no more.
 pub(crate) fn refusal(setup: &Setup) -> Option<String> {
+    // What the first round does not determine, further ones do.
+    setup.plan.adaptive().is_none().then_some(())?;
     Forecast::refusal(&setup.plan, &setup.rig, &setup.sequence).map(|error| undetermined(&error))
 }
 

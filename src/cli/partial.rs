@@ -248,6 +248,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
         truth: None,
         independent: &[],
         derived: &derived,
+        rounds: &[],
     };
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;

@@ -10,7 +10,7 @@ use super::outlook::{self, outlook, warning};
 use super::output::{note, say, say_json};
 use super::setup::Setup;
 use super::target;
-use super::text::{duration, row, table};
+use super::text::{duration, percent, row, table};
 use crate::plan::Prediction;
 use crate::rig::AXES;
 use crate::study::{Forecast, ForecastError};
@@ -62,6 +62,7 @@ fn as_text(
         ("rig time", prediction.total_s()),
     ];
     rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
+    rows.extend(decided_on_the_way(setup));
     if let Ok(forecast) = outlook {
         let (count, condition) = (forecast.coefficients, forecast.condition);
         rows.push(row(
@@ -84,6 +85,25 @@ fn as_text(
         }
     }
     text
+}
+
+/// What is decided while an adaptive plan runs: all else is said of its first round.
+fn decided_on_the_way(setup: &Setup) -> Option<Vec<String>> {
+    let adaptive = setup.plan.adaptive()?;
+    let radiance = adaptive.radiance_relative.map(|part| format!("radiance to {}", percent(part)));
+    let exitance = adaptive.exitance_relative.map(|part| format!("exitance to {}", percent(part)));
+    let targets: Vec<String> = radiance.into_iter().chain(exitance).collect();
+    let limit = setup.plan.stop.rig_time_max.map_or(0.0, |limit| limit.as_secs_f64());
+    let arc_deg = adaptive.arc_rad(&setup.plan, &setup.rig).to_degrees();
+    Some(row(
+        "adaptive",
+        format!(
+            "this is the first round, meridians at most {arc_deg:.1}° of arc apart; more follow until \
+             {}, within {} at most",
+            targets.join(" and "),
+            duration(limit)
+        ),
+    ))
 }
 
 /// How many, how fast, and how far a window goes.
@@ -133,6 +153,12 @@ fn as_json(
             "theta_deg": theta.to_degrees(), "phi_deg": phi.to_degrees(),
             "x_mm": x * 1e3, "y_mm": y * 1e3,
         },
+        "adaptive": setup.plan.adaptive().map(|adaptive| json!({
+            "radiance_relative": adaptive.radiance_relative,
+            "exitance_relative": adaptive.exitance_relative,
+            "first_round_s": prediction.total_s(),
+            "at_most_s": setup.plan.stop.rig_time_max.map(|limit| limit.as_secs_f64()),
+        })),
         "fit": fit,
         "uncertainty": uncertainty,
         "time_s": {

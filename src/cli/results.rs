@@ -175,6 +175,7 @@ impl Results {
             truth: self.truth,
             independent: &self.independent,
             derived: &self.derived,
+            rounds: &setup.accounts,
         };
         write_atomically(path, |out| file.write(out))
     }
@@ -213,7 +214,8 @@ pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), F
     let header = reader.header()?;
     let name = Some(header.plan_name.clone());
     let setup =
-        Setup::from_inputs(reader.inputs()?, name, header.seed, header.effect_wishes.clone())?;
+        Setup::from_inputs(reader.inputs()?, name, header.seed, header.effect_wishes.clone())?
+            .with_rounds(&reader)?;
     let readings = reader.readings(Order::Taken)?;
     Ok((setup, header, readings))
 }

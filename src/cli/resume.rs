@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::acquire::{Acquired, Pace, acquire};
+use super::adapting;
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{JOURNAL, effects};
@@ -74,6 +75,7 @@ pub(crate) fn what_is_left(journal: &Path) -> Result<(Setup, Remainder), Failure
             "use the version of gonio that began it",
         ));
     }
+    let setup = setup.with_rounds(&reader)?;
     let left = remainder(&reader.steps()?, &reader.readings(Order::Taken)?, &reader.sessions()?);
     Ok((setup, left))
 }
@@ -86,13 +88,16 @@ pub(crate) fn job(
     accepts_drift: bool,
     (on_fault, pace): (OnFault, Pace),
 ) -> Result<Option<Job>, Failure> {
-    if left.steps.is_empty() || left.rule.is_some() {
+    let is_decided = setup.accounts.last().is_some_and(|account| account.verdict.is_some());
+    let is_open = setup.plan.adaptive().is_some() && !is_decided;
+    if (left.steps.is_empty() && !is_open) || left.rule.is_some() {
         return Ok(None);
     }
     let before = Reader::open(journal)?.readings(Order::Taken)?;
     let rig = Arc::new(setup.rig.clone());
     let mut job = first_job(setup, on_fault, pace)?;
     job.rule = stopping::rule(setup, before.clone(), pace)?;
+    job.decider = adapting::decider(setup, before.clone(), pace)?;
     job.check = Some(check(rig, &setup.sequence, left, before, accepts_drift));
     job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
     job.steps.clone_from(&left.steps);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::acquire::{Acquired, Pace, acquire, exit_code};
+use super::adapting;
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{create, default_folder, exists_already};
@@ -52,6 +53,7 @@ pub(crate) fn first_job(setup: &Setup, on_fault: OnFault, pace: Pace) -> Result<
     job.warm_up = setup.plan.warm_up.map(|gate| (gate, setup.sequence.warm_up(0), 0));
     job.rig_time_max = setup.plan.stop.rig_time_max;
     job.rule = stopping::rule(setup, Vec::new(), pace)?;
+    job.decider = adapting::decider(setup, Vec::new(), pace)?;
     Ok(job)
 }
 
@@ -67,6 +69,7 @@ pub(crate) fn finish(
     let journal = journal
         .map_err(|error| Failure::midway(format!("{error}\n  help: {}", resume_line(folder))))?;
     let is_as_planned = outcome.is_as_planned();
+    let setup = &setup.clone().with_rounds(journal.reader())?;
     let readings = journal.reader().readings(Order::Taken)?;
     let results = match Results::of(setup, setup.plan.fit, &readings) {
         // Too little was measured to say anything.
@@ -94,7 +97,7 @@ pub(crate) fn finish(
     if !is_as_planned {
         return Err(interrupted(folder, &outcome));
     }
-    if let Some(missed) = stopping::missed(setup, &results) {
+    if let Some(missed) = stopping::missed(setup, &results).or_else(|| adapting::missed(setup)) {
         return Err(Failure::midway(missed));
     }
     let n_excluded = results.fitted.as_ref().map_or(usize::MAX, |fitted| fitted.n_excluded);

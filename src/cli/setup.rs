@@ -8,13 +8,15 @@ use std::sync::Arc;
 
 use spanned_toml::{Document, Source};
 
+use super::adapting;
 use super::args::{EffectArgs, RigArgs};
 use super::failure::Failure;
 use super::inputs::{BUILT_IN, Inputs, beside};
 use super::nominal::nominal;
-use crate::journal::{EffectWishes, Input, InputRole};
+use crate::journal::{EffectWishes, Input, InputRole, Reader};
 use crate::plan::{Plan, PlanHash, Region, Sequence};
 use crate::rig::Rig;
+use crate::study::adaptive::Account;
 
 /// The simulated rig, compiled from its scene.
 #[derive(Debug, Clone)]
@@ -31,7 +33,10 @@ pub(crate) struct Setup {
     pub(crate) plan_name: String,
     pub(crate) plan_hash: PlanHash,
     pub(crate) rig: Rig,
+    /// All of it, but for what an adaptive run's rounds are still to add.
     pub(crate) sequence: Sequence,
+    /// What an adaptive run's rounds found so far.
+    pub(crate) accounts: Vec<Account>,
     /// The text of the plan's list of poses, if it has one.
     pub(crate) list: Option<Source>,
     /// `None` for a real rig.
@@ -92,7 +97,8 @@ impl Setup {
         for input in inputs.iter_mut().filter(|input| input.role == InputRole::Plan) {
             input.bytes = plan.document().source().text().as_bytes().to_vec();
         }
-        Ok(Self { plan, plan_hash, sequence, stage, seed, inputs, ..self.clone() })
+        let accounts = Vec::new();
+        Ok(Self { plan, plan_hash, sequence, accounts, stage, seed, inputs, ..self.clone() })
     }
 
     fn build(
@@ -110,7 +116,29 @@ impl Setup {
         let terms = terms_of(&rig, &plan, &sequence, seed, wishes);
         let stage = read_stage(&mut inputs, plan_path, &plan, &choice, &rig, &terms)?;
         let (inputs, wishes) = (inputs.read().to_vec(), choice.wishes);
-        Ok(Self { plan, plan_name, plan_hash, rig, sequence, list, stage, seed, wishes, inputs })
+        let accounts = Vec::new();
+        Ok(Self {
+            plan,
+            plan_name,
+            plan_hash,
+            rig,
+            sequence,
+            accounts,
+            list,
+            stage,
+            seed,
+            wishes,
+            inputs,
+        })
+    }
+
+    /// The same with what a run's rounds have added to it by now.
+    pub(crate) fn with_rounds(mut self, reader: &Reader) -> Result<Self, Failure> {
+        if self.plan.adaptive().is_some() {
+            self.sequence = self.sequence.with_steps(&self.rig, reader.steps()?);
+            self.accounts = adapting::accounts(reader)?;
+        }
+        Ok(self)
     }
 
     /// The fit's region.
@@ -161,11 +189,14 @@ pub(crate) fn terms_of(
     if wishes.ignores_plan {
         return terms;
     }
+    // What readings decide upon ends by the plan's limit.
+    let limit = plan.stop.rig_time_max.filter(|_| plan.adaptive().is_some());
+    let run_s = limit.map_or(sequence.prediction.total_s(), |limit| limit.as_secs_f64());
     sim::Terms {
         region: Some(region_of(plan)),
         dwell_s: plan.dwell.as_secs_f64(),
         sweep: sequence.speeds(rig),
-        run_s: sequence.prediction.total_s(),
+        run_s,
         ..terms
     }
 }

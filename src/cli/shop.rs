@@ -6,6 +6,7 @@ use std::path::Path;
 use spanned_toml::{Document, Source};
 
 use super::acquire::Pace;
+use super::adapting;
 use super::failure::Failure;
 use super::folder::{JOURNAL, create};
 use super::inputs::Bundle;
@@ -148,13 +149,21 @@ impl Workshop for Shop {
     }
 
     fn check(&self, bundle: &[u8]) -> Result<Checked, Refusal> {
-        let (setup, notes) = self.set_up(bundle)?;
+        let (setup, mut notes) = self.set_up(bundle)?;
         let prediction = &setup.sequence.prediction;
+        let limit = setup.plan.stop.rig_time_max.filter(|_| setup.plan.adaptive().is_some());
+        if let Some(limit) = limit {
+            let most_s = limit.as_secs_f64();
+            notes.push(format!(
+                "targets and readings are those of its first round; further ones follow from what it \
+                 reads, within {most_s:.0} s"
+            ));
+        }
         Ok(Checked {
             name: setup.plan_name.clone(),
             targets: prediction.targets,
             readings: prediction.readings,
-            predicted_s: prediction.total_s(),
+            predicted_s: limit.map_or(prediction.total_s(), |limit| limit.as_secs_f64()),
             notes,
         })
     }
@@ -209,7 +218,7 @@ impl Shop {
             Err(error) => format!("no fit: {error}"),
         };
         let rule = rule_met(&sessions);
-        let missed = stopping::missed(&setup, &results);
+        let missed = stopping::missed(&setup, &results).or_else(|| adapting::missed(&setup));
         let mut summary = format!("{measured} of {planned} targets measured; {fit}");
         if let Some(rule) = &rule {
             summary = format!("stopped by the plan's rule: {rule}; {summary}");

@@ -7,6 +7,7 @@ use std::path::Path;
 use fit::{Angular, BasisSpec, BeamRows, Choice, Fit, Penalty, Position, Resolves, Robust, Width};
 use serde_json::{Value, json};
 
+use super::adapting;
 use super::derive;
 use super::report::REPORT;
 use super::results::{Results, targets_planned};
@@ -52,6 +53,7 @@ impl Summary<'_> {
             let spread = percent(drift.spread / drift.mean.abs());
             rows.push(row("reference", format!("{} readings within {spread}", drift.readings)));
         }
+        rows.extend(adapting::rows(setup));
         rows.extend(self.fit_rows());
         rows.push(row("folder", self.folder.display().to_string()));
         rows.push(row("report", self.folder.join(REPORT).display().to_string()));
@@ -116,6 +118,9 @@ impl Summary<'_> {
             "folder": self.folder.display().to_string(),
             "report": self.folder.join(REPORT).display().to_string(),
         });
+        if setup.plan.adaptive().is_some() {
+            object["adaptive"] = adapting::as_json(setup);
+        }
         match &results.fitted {
             Ok(fitted) => {
                 let (exitance, flux) = (fitted.fit.exitance(), fitted.fit.flux());

@@ -21,6 +21,12 @@ const HELP: &str = "write for example exitance=0.5%, flux=1% or radiance=0.02";
 
 /// Searches, says what was found, and writes it if asked to.
 pub(crate) fn plan(args: &PlanArgs, setup: &Setup) -> Outcome {
+    if setup.plan.adaptive().is_some() {
+        return Err(Failure::with_help(
+            "--target: an adaptive plan has its own target, and finds its sweeps while it runs",
+            "set radiance_relative or exitance_relative in its [schedule]",
+        ));
+    }
     let demand = demand(&args.target, args.without_scale)?;
     if let Some(output) = args.output.as_deref().filter(|output| output.exists()) {
         return Err(Failure::with_help(

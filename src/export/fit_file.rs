@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::charted::{put_charted, ray_json, region_json};
 use super::{DerivedQuantity, Treatment};
 use crate::rig::Quantity;
+use crate::study::adaptive::Account;
 
 /// What fit.json says. Numbers that do not exist are `null`.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +40,8 @@ pub struct FitFile<'a> {
     pub independent: &'a [Contribution],
     /// What was derived from the fit beyond what is always there.
     pub derived: &'a [DerivedQuantity],
+    /// What was found after each round of a run that decided on the way; empty for others.
+    pub rounds: &'a [Account],
 }
 
 /// What leaves a simulated sample, by the definitions of the fit's own quantities.
@@ -116,6 +119,9 @@ impl FitFile<'_> {
         put("symmetry", self.treatment.symmetry_json());
         put("nonnegative", self.treatment.nonnegative_json());
         put("notes", json!(self.notes));
+        if !self.rounds.is_empty() {
+            put("rounds", json!(self.rounds));
+        }
         if fit.region().chart == Chart::Surface {
             put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
             put("uncertainty_budget_exitance_independent", budget(self.independent));
@@ -335,6 +341,7 @@ mod tests {
             truth: Some(truth),
             independent: &[],
             derived: &[],
+            rounds: &[],
         };
         let json = written(&file);
         let number = |path: &str| json.pointer(path).and_then(Value::as_f64).expect(path);
@@ -383,6 +390,7 @@ mod tests {
                 truth: None,
                 independent: &[],
                 derived: &[],
+                rounds: &[],
             };
             let json = written(&file);
             let object = json.as_object().unwrap();

@@ -19,7 +19,9 @@ pub(crate) struct FrontierArgs {
     pub(crate) rig: RigArgs,
     #[command(flatten)]
     pub(crate) effects: EffectArgs,
-    /// stop-and-go or sweep, with commas between. Default: both, where the plan can be flown.
+    /// stop-and-go, sweep or adaptive, with commas between. Default: the first two, where the plan can
+    /// be flown, and the plan's own. Of an adaptive one --density divides the error that is asked for,
+    /// by its square root.
     #[arg(long = "strategy", value_name = "NAMES", value_delimiter = ',', value_parser = strategy)]
     pub(crate) strategies: Vec<Strategy>,
     /// Factors on the number of targets, with commas between; every combination with --dwell and

@@ -23,7 +23,7 @@ use crate::export::{ExportError, write_atomically, write_frontier};
 use crate::journal::Order;
 use crate::report::frontier_pictures;
 use crate::run::OnFault;
-use crate::study::{FrontierPoint, FrontierRow, points};
+use crate::study::{Foretold, FrontierPoint, FrontierRow, points};
 
 mod rungs;
 mod words;
@@ -127,6 +127,7 @@ fn run_one(entry: &Entry, folder: &Path, k: u64) -> Result<FrontierRow, Failure>
     let journal = journal.map_err(Failure::midway)?;
     let readings = journal.reader().readings(Order::Taken)?;
     let results = Results::of(&setup, setup.plan.fit, &readings)?;
+    let setup = setup.with_rounds(journal.reader())?;
     journal.close().map_err(Failure::midway)?;
     row(entry, &setup, &results, rig_s, readings.len(), began)
 }
@@ -147,6 +148,11 @@ fn row(
         Failure::start("the scene is dark: relative errors need some light in the plan's region")
     })?;
     let (exitance, flux) = (fitted.fit.exitance(), fitted.fit.flux());
+    // Of what was decided on the way, its steps' own time can be said when they are known.
+    let foretold = match setup.plan.adaptive() {
+        Some(_) => Foretold::of(true, &setup.sequence.prediction, None),
+        None => entry.foretold,
+    };
     Ok(FrontierRow {
         scene: setup.plan_name.clone(),
         strategy: entry.strategy.name().to_owned(),
@@ -160,7 +166,7 @@ fn row(
         u_exitance_relative: exitance.u / exitance.value,
         error_shape_rms_relative: score.shape_rms_relative,
         error_exitance_shape_relative: score.factor * exitance.value / truth.exitance - 1.0,
-        foretold: entry.foretold,
+        foretold,
         compute_s: began.elapsed().as_secs_f64(),
     })
 }

@@ -44,7 +44,9 @@ pub(super) fn entries(setup: &Setup, args: &FrontierArgs) -> Result<Vec<Entry>, 
     for strategy in Strategy::ALL {
         let is_own = strategy == Strategy::of(&setup.plan.schedule);
         let is_asked = args.strategies.contains(&strategy);
-        if !is_asked && !args.strategies.is_empty() {
+        // What decides by itself takes its time to: only where it is asked for.
+        let is_default = args.strategies.is_empty() && (is_own || strategy != Strategy::Adaptive);
+        if !(is_asked || is_default) {
             continue;
         }
         for rung in rungs(args, strategy)? {
@@ -89,8 +91,9 @@ fn entry(setup: &Setup, strategy: Strategy, rung: Rung) -> Result<Entry, Failure
     let name = strategy.name();
     let changes = strategy.changes(&setup.plan).ok_or_else(|| {
         Failure::with_help(
-            format!("{name}: the plan's list of poses has no meridians to fly along"),
-            "give a plan with a grid, or another --strategy",
+            format!("{name}: the plan's schedule does not say what that needs"),
+            "a list of poses has no meridians to fly along, an adaptive schedule no grid: give a plan \
+             with a grid or sweeps, or another --strategy",
         )
     })?;
     let plan = setup.plan.changed(&changes).and_then(|plan| rung.text(&plan)).ok_or_else(|| {
@@ -100,7 +103,7 @@ fn entry(setup: &Setup, strategy: Strategy, rung: Rung) -> Result<Entry, Failure
         )
     })?;
     let setup = setup.with_plan(plan, setup.seed)?;
-    let is_sweep = strategy == Strategy::Sweep;
+    let is_sweep = strategy != Strategy::StopAndGo;
     let foretold =
         Foretold::of(is_sweep, &setup.sequence.prediction, outlook(&setup).ok().as_ref());
     Ok(Entry { strategy, rung, setup, foretold })

@@ -14,6 +14,7 @@ use std::process::ExitCode;
 
 use serde_json::json;
 
+use super::adapting;
 use super::args::ReportArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::JOURNAL;
@@ -108,6 +109,7 @@ pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Re
             ..Section::default()
         }),
     }
+    sections.extend(adapting::section(setup));
     sections.extend(course::signal(setup, results, record.readings, length_s));
     sections.extend(flagged::section(setup, results));
     sections.extend(flagged::effects(setup));
