@@ -66,6 +66,9 @@ pub(crate) struct CoverageArgs {
     /// The seed of all that is drawn.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,
+    /// Leave basis and penalty to the readings instead of pinning the plans' degrees.
+    #[arg(long)]
+    pub(crate) unpinned: bool,
     /// A few runs of two scenes: seconds.
     #[arg(long)]
     pub(crate) short: bool,

@@ -26,8 +26,8 @@ use crate::report::{Cells, scores_svg};
 use crate::rig::Rig;
 use crate::run::OnFault;
 use crate::study::coverage::{
-    Cell, Draws, FAMILIES, Family, Kind, Pool, Run, Scale, Score, Target, binomial_band, demands,
-    tally, targets,
+    Cell, Drawn, Draws, FAMILIES, Family, Kind, Pool, Run, Scale, Score, Target, binomial_band,
+    demands, tally, targets,
 };
 
 /// Of a real lamp; CC0 as its notice beside it says.
@@ -48,6 +48,8 @@ pub(super) struct Studied {
     pub(super) pools: Vec<Pool>,
     /// Why runs came to no fit, one sentence each.
     pub(super) refused: Vec<String>,
+    /// Whether the plans leave basis and penalty to the readings.
+    pub(super) unpinned: bool,
 }
 
 /// A run to make.
@@ -74,7 +76,7 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
     let work = folder.join("runs");
     std::fs::create_dir_all(&work)
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
-    let studied = study(families, runs, args.seed, &work)?;
+    let studied = study(families, runs, args, &work)?;
     // Ours, and empty but for runs that were refused.
     let _ = std::fs::remove_dir_all(&work);
     let demands = demands(&studied.cells, &studied.pools);
@@ -117,7 +119,13 @@ fn families(args: &CoverageArgs) -> Result<Vec<Family>, Failure> {
 }
 
 /// Every scene on rigs of both kinds, so many runs each, on as many threads as the machine has.
-fn study(families: Vec<Family>, runs: usize, seed: u64, work: &Path) -> Result<Studied, Failure> {
+fn study(
+    families: Vec<Family>,
+    runs: usize,
+    args: &CoverageArgs,
+    work: &Path,
+) -> Result<Studied, Failure> {
+    let (seed, unpinned) = (args.seed, args.unpinned);
     let rig = Rig::built_in()?.document().source().text().to_owned();
     let entries: Vec<Entry> = (0..families.len())
         .flat_map(|family| (0..Scale::ALL.len()).map(move |scale| (family, scale)))
@@ -129,7 +137,11 @@ fn study(families: Vec<Family>, runs: usize, seed: u64, work: &Path) -> Result<S
         let place = FAMILIES.iter().position(|f| *f == family).unwrap_or(0);
         let mut draws = Draws::at(seed, &[place as u64, entry.scale as u64, entry.run as u64]);
         let folder = work.join(format!("{}-{}-{}", family.name(), entry.scale, entry.run));
-        run_one(family, scale, &mut draws, &rig, &folder)
+        let mut drawn = family.draw(&mut draws, scale, &rig, PHOTOMETRIC);
+        if unpinned {
+            drawn = drawn.unpinned();
+        }
+        run_one(drawn, draws.seed(), &folder)
             .map_err(|failure| format!("{}, run {}: {}", family.name(), entry.run, failure.text()))
     };
     let done = in_parallel(&entries, one);
@@ -163,7 +175,7 @@ fn study(families: Vec<Family>, runs: usize, seed: u64, work: &Path) -> Result<S
         }
         pools.extend(pools_of(None, Scale::ALL[scale], &followed));
     }
-    Ok(Studied { runs, seed, families, cells, pools, refused })
+    Ok(Studied { runs, seed, families, cells, pools, refused, unpinned })
 }
 
 /// The pools of one kind of rig, a quantity each.
@@ -210,14 +222,7 @@ fn in_parallel<T: Send>(entries: &[Entry], one: impl Fn(&Entry) -> T + Sync) -> 
 }
 
 /// One run of a scene as drawn, from the wire to the scores.
-fn run_one(
-    family: Family,
-    scale: Scale,
-    draws: &mut Draws,
-    rig: &str,
-    folder: &Path,
-) -> Result<(Vec<Target>, Run), Failure> {
-    let drawn = family.draw(draws, scale, rig, PHOTOMETRIC);
+fn run_one(drawn: Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run), Failure> {
     let input = |role, name: &str, bytes: &[u8]| Input {
         role,
         name: name.to_owned(),
@@ -230,7 +235,7 @@ fn run_one(
     ];
     let attached = drawn.attachments.iter();
     inputs.extend(attached.map(|a| input(InputRole::Attachment, &a.name, &a.bytes)));
-    let setup = Setup::from_inputs(inputs, None, draws.seed(), EffectWishes::default())?;
+    let setup = Setup::from_inputs(inputs, None, seed, EffectWishes::default())?;
     let acquired = acquire(&setup, Pace::Virtual, || {
         let (journal, _) = create(folder, &setup)?;
         Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))

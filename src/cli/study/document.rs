@@ -13,14 +13,15 @@ use crate::cli::text::table;
 use crate::export::{with_section, write_atomically};
 use crate::study::coverage::{Demand, Family, Pool};
 
-/// The section's marks in the document.
-const NAME: &str = "coverage";
+/// The section's marks in the document, with pinned plans and with such as leave the basis open.
+const NAMES: [&str; 2] = ["coverage", "coverage-unpinned"];
 
 /// The document that a section goes to.
 pub(super) struct Document {
     path: PathBuf,
     date: String,
     figure: Option<PathBuf>,
+    name: &'static str,
 }
 
 impl Document {
@@ -33,7 +34,8 @@ impl Document {
                 "add it, for example --date 2026-11-22",
             ));
         };
-        Ok(Some(Self { path, date, figure: args.figure.clone() }))
+        let name = NAMES[usize::from(args.unpinned)];
+        Ok(Some(Self { path, date, figure: args.figure.clone(), name }))
     }
 
     /// Replaces the section, or adds it; and the figure.
@@ -44,7 +46,7 @@ impl Document {
         } else {
             String::new()
         };
-        let new = with_section(&old, NAME, section);
+        let new = with_section(&old, self.name, section);
         write_atomically(&self.path, |out| out.write_all(new.as_bytes()))
             .map_err(Failure::midway)?;
         if let Some(figure) = &self.figure {
@@ -110,21 +112,33 @@ pub(super) fn summary(studied: &Studied, demands: &[Demand]) -> String {
 
 /// For the document: Markdown.
 pub(super) fn section(studied: &Studied, demands: &[Demand], document: &Document) -> String {
-    let Studied { runs, seed, families, .. } = studied;
+    let Studied { runs, seed, families, unpinned, .. } = studied;
+    let (title, flag) = if *unpinned {
+        ("The same with basis and penalty chosen from the readings", " --unpinned")
+    } else {
+        ("Do the stated uncertainties cover the truth?", "")
+    };
     let names: Vec<&str> = families.iter().map(|family| family.name()).collect();
     let (followed, limited): (Vec<_>, Vec<_>) =
         families.iter().partition(|family| !family.is_limited_by_basis());
     let list =
         |of: &[&Family]| of.iter().map(|family| family.name()).collect::<Vec<_>>().join(", ");
+    let basis = if *unpinned {
+        format!("The plans pin no basis; polynomials follow {} exactly", list(&followed))
+    } else {
+        format!(
+            "The plan's basis follows {} exactly; it limits {}",
+            list(&followed),
+            list(&limited)
+        )
+    };
     let mut text = format!(
-        "## Do the stated uncertainties cover the truth?\n\n{runs} runs of each of {} scenes, on rigs \
+        "## {title}\n\n{runs} runs of each of {} scenes, on rigs \
          that know their scale as a rig file states it, and exactly. Every run draws the scene's \
          numbers, the rig and its noise anew, and goes through the wire, the journal, the calibration \
-         and the fit as `gonio run` does. The plan's basis follows {} exactly; it limits {}. An \
-         interval is value ± 1.96 u. Several rays of a run share its errors.\n\n",
+         and the fit as `gonio run` does. {basis}. An interval is value ± 1.96 u. Several rays of a \
+         run share its errors.\n\n",
         families.len(),
-        list(&followed),
-        list(&limited),
     );
     let _ = writeln!(text, "| {} |\n|{}", HEADS.join(" | "), " --- |".repeat(HEADS.len()));
     for pool in &studied.pools {
@@ -143,7 +157,7 @@ pub(super) fn section(studied: &Studied, demands: &[Demand], document: &Document
     }
     let _ = writeln!(
         text,
-        "\n`gonio study coverage --scenes {} --runs {runs} --seed {seed}`  \n{}",
+        "\n`gonio study coverage --scenes {} --runs {runs} --seed {seed}{flag}`  \n{}",
         names.join(","),
         document.date
     );

@@ -80,6 +80,17 @@ pub struct Drawn {
     pub attachments: Vec<Attachment>,
 }
 
+impl Drawn {
+    /// The same with a plan that leaves basis and penalty to the readings.
+    #[must_use]
+    pub fn unpinned(mut self) -> Self {
+        if let Some(at) = self.plan.find(FIT) {
+            self.plan.truncate(at);
+        }
+        self
+    }
+}
+
 impl Family {
     /// As the command line and coverage.csv name it.
     pub const fn name(self) -> &'static str {
@@ -157,7 +168,7 @@ impl Family {
         let _ = write!(
             plan,
             "\n[schedule]\nkind = \"cgamma\"\nx_count = {}\ny_count = {}\nc_step_deg = {phi_step}\n\
-             gamma_step_deg = {theta_step}\norder = \"travel\"\n\n[fit]\nangular_degree = \
+             gamma_step_deg = {theta_step}\norder = \"travel\"\n{FIT}angular_degree = \
              {angular_degree}\nposition_degree = {position_degree}\n",
             places.0, places.1,
         );
@@ -186,7 +197,9 @@ fn off_axis(draws: &mut Draws, level: f64) -> String {
 /// A grey image of one row, from 1 - 2 slope on its left to 1 + 2 slope on its right: at the region's
 /// ends a sixth of that. Finer than any footprint.
 fn ramp(slope: f64) -> Vec<u8> {
-    let columns = 1024;
+    // The middle of the region, and the places aside that are asked for, then lie in the middle of
+    // a column: what is asked of a staircase is its slope.
+    let columns = 4099;
     let mut text = format!("P2\n{columns} 1\n65535\n");
     for column in 0..columns {
         let part = 2.0 * (f64::from(column) + 0.5) / f64::from(columns) - 1.0;
@@ -226,6 +239,8 @@ fn rig_text(rig: &str, scale: Scale, dark_a: f64) -> String {
     text
 }
 
+/// Where a plan pins its basis: its last table.
+const FIT: &str = "\n[fit]\n";
 const IMAGE: &str = "ramp.pgm";
 const TABLE: &str = "table.ies";
 /// Wide enough that no beam reaches beyond it.
