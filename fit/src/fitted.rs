@@ -5,7 +5,10 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
-use crate::{BasisSpec, BeamRows, FitError, Influence, Penalised, Penalty, Ray, Region, Weighed};
+use crate::{
+    BasisSpec, BeamRows, FitError, Functional, Influence, Penalised, Penalty, Ray, Region,
+    Truncation, Weighed,
+};
 use radiometry::DomainError;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -46,6 +49,9 @@ pub struct Parts {
     pub shifts: Vec<CommonShift>,
     /// How good the fit is.
     pub quality: Quality,
+    /// What the functions can't follow, as far as the readings tell; see
+    /// [`Fit::with_truncation`]. The factor is then that of the noise beside it.
+    pub truncation: Option<Truncation>,
 }
 
 /// The coefficients' shift by one standard uncertainty of a common component.
@@ -77,7 +83,8 @@ pub struct Quality {
     /// Standard deviation of scatter beyond the stated noise, in the value's unit: what the basis
     /// can't follow, pose jitter, drift. 0 unless chi2 exceeds its dof by 3 of its standard
     /// deviations (or the noise was unknown). It is part of the weights and of every u, taken as
-    /// independent from reading to reading.
+    /// independent from reading to reading, as far as
+    /// [`Fit::with_truncation`] does not find another reason for it.
     pub excess_rms: f64,
     /// How the rows stand for the detector's beam; `None` where none was known.
     pub beam: Option<BeamRows>,
@@ -87,6 +94,8 @@ pub struct Quality {
 #[derive(Debug, Clone)]
 pub struct Fit {
     basis: Basis,
+    /// Of [`Truncation::beyond`].
+    beyond: Option<Basis>,
     parts: Parts,
     influence: Option<Influence>,
     weighed: Option<Weighed>,
@@ -107,7 +116,8 @@ impl Fit {
         for common in &parts.shifts {
             demand("shift", p, &common.shift)?;
         }
-        Ok(Self { basis, parts, influence: None, weighed: None })
+        let beyond = parts.truncation.as_ref().map(|t| beyond(t, p, parts.region)).transpose()?;
+        Ok(Self { basis, beyond, parts, influence: None, weighed: None })
     }
 
     pub(crate) fn with_influence(self, influence: Influence) -> Self {
@@ -168,13 +178,16 @@ impl Fit {
     /// In charts other than the surface one it is no exitance but the flux over the region's area,
     /// or at the point of an environment the spherical irradiance ∫ L dω.
     pub fn exitance(&self) -> Estimate {
-        self.estimate(self.basis.exitance())
+        self.estimate(&self.exitance_functional())
     }
 
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
     /// An angle outside [0, π/2] is refused.
     pub fn exitance_within(&self, theta_max_rad: f64) -> Result<Estimate, DomainError> {
-        Ok(self.estimate(&self.basis.exitance_within(theta_max_rad)?))
+        let own = self.basis.exitance_within(theta_max_rad)?;
+        let within = |basis: &Basis| basis.exitance_within(theta_max_rad);
+        let beyond = self.beyond.as_ref().map(within).transpose()?.unwrap_or_default();
+        Ok(self.estimate(&Functional::new(own, beyond)))
     }
 
     /// The exitance within the region's own cone, mean over the region: what rests on measurement.
@@ -182,8 +195,7 @@ impl Fit {
         let is_whole = self.region().chart.is_whole_sphere();
         let end_rad = if is_whole { PI } else { FRAC_PI_2 };
         let theta_max_rad = self.region().theta_max_rad.min(end_rad);
-        let within = self.basis.exitance_within(theta_max_rad);
-        self.estimate(within.as_deref().unwrap_or(self.basis.exitance()))
+        self.exitance_within(theta_max_rad).unwrap_or_else(|_| self.exitance())
     }
 
     /// The flux that leaves the region: exitance times its area, in the values' unit times m² sr.
@@ -194,7 +206,7 @@ impl Fit {
     /// The intensity of the region as a whole in a direction: ∫ L cos θ dA, in the values' unit
     /// times m²; of an object ∫ L dA over the plane across the direction.
     pub fn intensity(&self, theta_rad: f64, phi_rad: f64) -> Estimate {
-        let mean = self.estimate(&self.basis.mean_over_region(theta_rad, phi_rad));
+        let mean = self.estimate(&self.mean_towards(theta_rad, phi_rad));
         let is_whole = self.region().chart.is_whole_sphere();
         let projection = if is_whole { 1.0 } else { libm::cos(theta_rad) };
         mean.times(self.region().area_m2() * projection)
@@ -209,7 +221,7 @@ impl Fit {
 
     /// The exitance's uncertainty by source, the independent part first.
     pub fn contributions(&self) -> Vec<Contribution> {
-        self.budget(self.basis.exitance())
+        self.budget(&self.exitance_functional())
     }
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.
@@ -217,7 +229,10 @@ impl Fit {
         let mut budget = self.budget(&self.radiance_functional(ray));
         let u = self.parts.model.truncation;
         if u > 0.0 {
-            budget.push(Contribution { name: TRUNCATION.to_owned(), u });
+            match budget.iter_mut().find(|row| row.name == TRUNCATION) {
+                Some(row) => row.u = libm::hypot(row.u, u),
+                None => budget.push(Contribution { name: TRUNCATION.to_owned(), u }),
+            }
         }
         budget
     }
@@ -227,7 +242,8 @@ impl Fit {
         &self.parts.coefficients
     }
 
-    /// The coefficients' covariance by all components, rows of a symmetric matrix.
+    /// The coefficients' covariance by all components but truncation, which is no field of the basis;
+    /// rows of a symmetric matrix.
     pub fn covariance(&self) -> Vec<Vec<f64>> {
         let p = self.basis.len();
         let mut covariance = vec![vec![0.0; p]; p];
@@ -311,29 +327,41 @@ impl Fit {
         &self.basis
     }
 
-    fn radiance_functional(&self, ray: &Ray) -> Vec<f64> {
-        let mut functional = vec![0.0; self.basis.len()];
-        self.basis.row(ray, &mut self.basis.scratch(), &mut functional);
-        functional
+    /// The functional that a function makes of a basis.
+    pub(crate) fn functional(&self, over: impl Fn(&Basis) -> Vec<f64>) -> Functional {
+        Functional::new(over(&self.basis), self.beyond.as_ref().map(over).unwrap_or_default())
+    }
+
+    fn exitance_functional(&self) -> Functional {
+        self.functional(|basis| basis.exitance().to_vec())
+    }
+
+    fn radiance_functional(&self, ray: &Ray) -> Functional {
+        self.weighted_rays([(*ray, 1.0)])
     }
 
     /// The one door from coefficients to a number with its uncertainty.
-    pub(crate) fn estimate(&self, functional: &[f64]) -> Estimate {
-        let independent = self.independent_variance(functional);
+    pub(crate) fn estimate(&self, functional: &Functional) -> Estimate {
+        let independent = self.noise_variance(functional) + self.missed_variance(functional);
         let common = self.common_shifts(functional).map(|(_, shift)| shift * shift);
         Estimate {
-            value: dot(functional, &self.parts.coefficients),
+            value: dot(functional.row(), &self.parts.coefficients),
             u: (independent + common.sum::<f64>()).sqrt(),
             u_independent: independent.sqrt(),
         }
     }
 
-    pub(crate) fn budget(&self, functional: &[f64]) -> Vec<Contribution> {
-        let independent = self.independent_variance(functional).sqrt();
+    pub(crate) fn budget(&self, functional: &Functional) -> Vec<Contribution> {
+        let independent = self.noise_variance(functional).sqrt();
         let mut budget = vec![Contribution { name: INDEPENDENT.to_owned(), u: independent }];
+        if self.parts.truncation.is_some() {
+            let u = self.missed_variance(functional).sqrt();
+            budget.push(Contribution { name: TRUNCATION.to_owned(), u });
+        }
+        let commons = budget.len();
         for (name, shift) in self.common_shifts(functional) {
             let source = name.split_once(" @ ").map_or(name, |(source, _)| source);
-            match budget.iter_mut().skip(1).find(|row| row.name == source) {
+            match budget.iter_mut().skip(commons).find(|row| row.name == source) {
                 Some(row) => row.u = libm::hypot(row.u, shift),
                 None => budget.push(Contribution { name: source.to_owned(), u: shift.abs() }),
             }
@@ -341,12 +369,19 @@ impl Fit {
         budget
     }
 
-    fn independent_variance(&self, functional: &[f64]) -> f64 {
-        self.factor_columns().map(|column| dot(column, functional).powi(2)).sum()
+    /// By what noise does to the fit.
+    fn noise_variance(&self, functional: &Functional) -> f64 {
+        self.factor_columns().map(|column| dot(column, functional.row()).powi(2)).sum()
     }
 
-    fn common_shifts(&self, functional: &[f64]) -> impl Iterator<Item = (&str, f64)> {
-        let shift = move |c: &CommonShift| dot(functional, &c.shift);
+    /// By what the functions can't follow.
+    fn missed_variance(&self, functional: &Functional) -> f64 {
+        let Some(Truncation { missed, .. }) = &self.parts.truncation else { return 0.0 };
+        missed.iter().map(|field| functional.times_field(field).powi(2)).sum()
+    }
+
+    fn common_shifts(&self, functional: &Functional) -> impl Iterator<Item = (&str, f64)> {
+        let shift = move |c: &CommonShift| dot(functional.row(), &c.shift);
         self.parts.shifts.iter().map(move |c| (c.name.as_str(), shift(c)))
     }
 
@@ -364,6 +399,16 @@ impl Estimate {
             u_independent: self.u_independent * factor.abs(),
         }
     }
+}
+
+/// The finer functions of a truncation that is sound beside p functions.
+fn beyond(truncation: &Truncation, p: usize, region: Region) -> Result<Basis, FitError> {
+    truncation.beyond.checked_len()?;
+    let basis = Basis::new(truncation.beyond, region)?;
+    for field in &truncation.missed {
+        demand("missed field", p + basis.len(), field)?;
+    }
+    Ok(basis)
 }
 
 fn demand(what: &'static str, expected: usize, numbers: &[f64]) -> Result<(), FitError> {

@@ -2,7 +2,7 @@
 //! coefficients. A quadrature of L over a receiver, a cone or a cell is such a sum, and here it
 //! gets its value and its uncertainty with all correlations. Knows no basis: the rows come from it.
 
-use crate::basis::dot;
+use crate::basis::{Basis, dot};
 use crate::{Contribution, Estimate, Fit, Ray};
 
 /// A linear functional of the field: the value is the row times the coefficients. It belongs to
@@ -10,9 +10,21 @@ use crate::{Contribution, Estimate, Fit, Ray};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Functional {
     row: Vec<f64>,
+    /// Over the functions beyond the fit's own, where it knows what it misses.
+    beyond: Vec<f64>,
 }
 
 impl Functional {
+    pub(crate) fn new(row: Vec<f64>, beyond: Vec<f64>) -> Self {
+        Self { row, beyond }
+    }
+
+    /// Of a field over the fit's functions and those beyond.
+    pub(crate) fn times_field(&self, field: &[f64]) -> f64 {
+        let (own, beyond) = field.split_at(self.row.len());
+        dot(&self.row, own) + dot(&self.beyond, beyond)
+    }
+
     /// One number a coefficient, in the unit of the weights.
     pub fn row(&self) -> &[f64] {
         &self.row
@@ -21,7 +33,7 @@ impl Functional {
     /// The functional times a number: a unit, an area, a share.
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
-        self.row.iter_mut().for_each(|element| *element *= factor);
+        self.row.iter_mut().chain(&mut self.beyond).for_each(|element| *element *= factor);
         self
     }
 
@@ -42,7 +54,9 @@ impl Functional {
     /// If the two have different numbers of coefficients, and so never belonged to one fit.
     pub fn add(&mut self, factor: f64, other: &Self) {
         assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
+        assert_eq!(self.beyond.len(), other.beyond.len(), "functionals of different fits");
         self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
+        self.beyond.iter_mut().zip(&other.beyond).for_each(|(a, b)| *a += factor * b);
     }
 }
 
@@ -90,30 +104,25 @@ impl Fit {
     /// # Panics
     /// If a weight or a number of a ray isn't finite: quadratures have none such.
     pub fn weighted_rays(&self, rays: impl IntoIterator<Item = (Ray, f64)>) -> Functional {
-        let basis = self.functions();
-        let mut scratch = basis.scratch();
-        let mut along = vec![0.0; basis.len()];
-        let mut row = vec![0.0; basis.len()];
-        for (ray, weight) in rays {
-            let Ray { x_m, y_m, theta_rad, phi_rad } = ray;
-            let is_finite = [x_m, y_m, theta_rad, phi_rad, weight].into_iter().all(f64::is_finite);
+        let rays: Vec<(Ray, f64)> = rays.into_iter().collect();
+        for (ray, weight) in &rays {
+            let Ray { x_m, y_m, theta_rad, phi_rad } = *ray;
+            let is_finite = [x_m, y_m, theta_rad, phi_rad, *weight].into_iter().all(f64::is_finite);
             assert!(is_finite, "not finite: {ray:?} of weight {weight}");
-            basis.row(&ray, &mut scratch, &mut along);
-            row.iter_mut().zip(&along).for_each(|(sum, element)| *sum += weight * element);
         }
-        Functional { row }
+        self.functional(|basis| sum_over(basis, &rays))
     }
 
     /// The mean of the radiance over the region in a direction, as a functional. Times the region's
     /// area and cos θ it is the intensity.
     pub fn mean_towards(&self, theta_rad: f64, phi_rad: f64) -> Functional {
-        Functional { row: self.functions().mean_over_region(theta_rad, phi_rad) }
+        self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad))
     }
 
     /// The flux in all directions of the chart, as a functional: from the region, through both
     /// rectangles of two planes.
     pub(crate) fn throughput_sum(&self) -> Functional {
-        Functional { row: self.functions().exitance().to_vec() }.times(self.region().area_m2())
+        self.functional(|basis| basis.exitance().to_vec()).times(self.region().area_m2())
     }
 
     /// The functional's value with its uncertainty, in the values' unit times the weights'.
@@ -122,7 +131,7 @@ impl Fit {
     /// If the functional has another number of coefficients, and so is of another fit.
     pub fn of(&self, functional: &Functional) -> Estimate {
         self.demand_own(functional);
-        self.estimate(&functional.row)
+        self.estimate(functional)
     }
 
     /// The functional's value alone: for searches.
@@ -137,10 +146,22 @@ impl Fit {
     /// As [`of`](Self::of).
     pub fn contributions_of(&self, functional: &Functional) -> Vec<Contribution> {
         self.demand_own(functional);
-        self.budget(&functional.row)
+        self.budget(functional)
     }
 
     fn demand_own(&self, functional: &Functional) {
         assert_eq!(functional.row.len(), self.coefficients().len(), "a functional of another fit");
     }
+}
+
+/// Σ wᵢ times the functions along rayᵢ.
+fn sum_over(basis: &Basis, rays: &[(Ray, f64)]) -> Vec<f64> {
+    let mut scratch = basis.scratch();
+    let mut along = vec![0.0; basis.len()];
+    let mut row = vec![0.0; basis.len()];
+    for (ray, weight) in rays {
+        basis.row(ray, &mut scratch, &mut along);
+        row.iter_mut().zip(&along).for_each(|(sum, element)| *sum += weight * element);
+    }
+    row
 }

@@ -19,6 +19,14 @@ pub struct Influence {
     /// The part of every sample's variance that nothing explains: see
     /// [`crate::Quality::excess_rms`], squared.
     pub excess: f64,
+    /// One a sample: its variance as the covariance takes it, in the values' unit squared.
+    pub variances: Vec<f64>,
+    /// The part of it that is stated.
+    pub(crate) stated: Vec<f64>,
+    /// What the samples count as having read.
+    pub(crate) values: Vec<f64>,
+    /// What one u of each nuisance does to them.
+    pub(crate) columns: Vec<Vec<f64>>,
 }
 
 impl Influence {
@@ -30,16 +38,7 @@ impl Influence {
         solved: &Solved,
         factor: &[f64],
     ) -> Self {
-        let functional = design.basis().exitance();
-        let p = functional.len();
-        let column = |j: usize| &factor[j * (j + 1) / 2..][..=j];
-        let mut carried = vec![0.0; p];
-        for j in 0..p {
-            let product = dot(column(j), &functional[..=j]);
-            for (out, s) in carried.iter_mut().zip(column(j)) {
-                *out += product * s;
-            }
-        }
+        let carried = carried(design, factor);
         let nuisances = solved.carried(&carried);
         let mut room = design.room();
         let along = |i: usize| {
@@ -52,6 +51,41 @@ impl Influence {
             .enumerate()
             .map(|(i, variance)| (design.level(i, &carried, &mut room) + along(i)) / variance)
             .collect();
-        Self { exitance, moved: settled.moved.clone(), excess: settled.excess }
+        let excess = settled.excess;
+        let stated = settled.variances.iter().zip(&settled.weights);
+        Self {
+            exitance,
+            moved: settled.moved.clone(),
+            excess,
+            variances: settled.variances.clone(),
+            stated: stated.map(|(variance, weight)| variance - excess / weight).collect(),
+            values: settled.values.clone(),
+            columns: settled.columns.clone(),
+        }
     }
+
+    /// Of the same samples under other variances.
+    pub(crate) fn under(&self, variances: Vec<f64>, design: &Design<'_>, factor: &[f64]) -> Self {
+        let carried = carried(design, factor);
+        let mut room = design.room();
+        let along = variances.iter().enumerate();
+        let exitance =
+            along.map(|(i, variance)| design.level(i, &carried, &mut room) / variance).collect();
+        Self { exitance, variances, ..self.clone() }
+    }
+}
+
+/// S Sᵀ f of the exitance.
+fn carried(design: &Design<'_>, factor: &[f64]) -> Vec<f64> {
+    let functional = design.basis().exitance();
+    let p = functional.len();
+    let column = |j: usize| &factor[j * (j + 1) / 2..][..=j];
+    let mut carried = vec![0.0; p];
+    for j in 0..p {
+        let product = dot(column(j), &functional[..=j]);
+        for (out, s) in carried.iter_mut().zip(column(j)) {
+            *out += product * s;
+        }
+    }
+    carried
 }

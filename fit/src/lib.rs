@@ -63,6 +63,7 @@ pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
 pub use solve::{fit, fit_flown, fit_readings, fit_seen};
 pub use symmetry::{Symmetry, SymmetryError, SymmetryTest};
+pub use truncation::Truncation;
 pub use undetermined::Cause;
 
 mod basis;
@@ -94,5 +95,6 @@ mod shift;
 mod solve;
 mod symmetry;
 pub mod triangle;
+mod truncation;
 mod undetermined;
 mod weights;

@@ -152,6 +152,11 @@ impl Roughness {
         Ok(Self { root, free })
     }
 
+    /// The square root over some of the functions (of splines over all), the constant held as well.
+    pub(crate) fn of_functions(&self, kept: &[usize]) -> Mat<f64> {
+        Mat::from_fn(kept.len(), kept.len(), |i, j| self.root.at(kept[i], kept[j]))
+    }
+
     /// The rows that stand for the penalty, to be taken in like readings of value 0, times `factor`.
     fn rows(&self, factor: f64) -> Mat<f64> {
         let p = self.free.len();

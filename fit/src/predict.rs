@@ -121,7 +121,8 @@ pub fn predict(
     let region = *region;
     let fit = |coefficients: Vec<f64>, shifts: Vec<CommonShift>, quality: Quality| {
         let factor = factor.clone();
-        Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality })
+        let truncation = None;
+        Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality, truncation })
             .map_err(|_| FitError::OutOfRange)
     };
     let mut fitted = coefficients.into_iter().zip(residuals);

@@ -38,6 +38,19 @@ pub struct Ruled {
     pub nonnegative: Option<Nonnegative>,
 }
 
+impl Ruled {
+    /// With what the field's functions can't follow in every u: [`Fit::with_truncation`] of the
+    /// readings that the field was fitted to.
+    pub fn with_truncation(
+        self,
+        readings: &Readings<'_>,
+        optics: Option<&Optics>,
+    ) -> Result<Self, FitError> {
+        let Readings { samples, flown, common, .. } = *readings;
+        Ok(Self { fit: self.fit.with_truncation(samples, flown, common, optics)?, ..self })
+    }
+}
+
 /// The fit of readings in the basis that the wish pins or that they ask for, by its rules. Limits
 /// have no part in the choice of the basis; nor have, once they are known, readings that lost nearly
 /// all their weight.

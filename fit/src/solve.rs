@@ -125,7 +125,9 @@ pub fn fit_readings(
     let weighed = weighed(readings, &settled, fitted);
     let own = nuisances.iter().zip(own);
     shifts.extend(own.map(|(c, shift)| CommonShift { name: c.name.clone(), shift }));
-    Fit::from_parts(Parts { region: *region, model, coefficients, factor, shifts, quality })
+    let region = *region;
+    let truncation = None;
+    Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality, truncation })
         .map(|fit| fit.with_influence(influence).with_weighed(weighed))
         .map_err(|_| FitError::OutOfRange)
 }

@@ -98,6 +98,7 @@ impl FitFile<'_> {
         put("basis", basis(fit.basis(), Some(fit.names())));
         put("penalty", json!({"power": fit.penalty().power, "strength": fit.penalty().strength}));
         put("truncation", json!(fit.model().truncation));
+        put("truncation_gain", json!(fit.parts().truncation.as_ref().map(|missed| missed.gain)));
         put("choice", self.choice.map_or(Value::Null, choice));
         put("resolves", self.resolves.map_or(Value::Null, resolves));
         put("region", region_json(fit.region()));

@@ -189,7 +189,7 @@ impl Directions {
     }
 
     /// How often a function goes round with φ; negative of sines.
-    fn order(&self, k: usize) -> i64 {
+    pub(crate) fn order(&self, k: usize) -> i64 {
         self.degree_and_order(k).1
     }
 

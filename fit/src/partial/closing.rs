@@ -82,7 +82,9 @@ impl Partial {
             };
             let shifts = shifts(&solution, common);
             let (region, model) = (*basis.region(), Penalised::new(basis.spec(), penalty));
-            let parts = Parts { region, model, coefficients, factor, shifts, quality };
+            // The readings are forgotten: nothing can be held against finer functions.
+            let truncation = None;
+            let parts = Parts { region, model, coefficients, factor, shifts, quality, truncation };
             let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
             return Ok(Closed { fit, u_factor: scatter.u_factor });
         }

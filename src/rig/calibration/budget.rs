@@ -11,7 +11,7 @@ impl Calibrated {
     /// samples are those that the fit was made of, restated from it. Empty for a fit that no longer
     /// knows what its samples did.
     pub fn independent_budget(&self, Fitted { fit, places, .. }: &Fitted) -> Vec<Contribution> {
-        let Some(Influence { exitance, moved, excess }) = fit.influence() else {
+        let Some(Influence { exitance, moved, variances, .. }) = fit.influence() else {
             return Vec::new();
         };
         if exitance.len() != places.len() {
@@ -19,7 +19,9 @@ impl Calibrated {
         }
         let (mut shot, mut read, mut quantisation, mut readback, mut rest) =
             (0.0, 0.0, 0.0, 0.0, 0.0);
-        for ((place, influence), moved) in places.iter().copied().zip(exitance).zip(moved) {
+        for (((place, influence), moved), variance) in
+            places.iter().copied().zip(exitance).zip(moved).zip(variances)
+        {
             let sample = &self.samples[place];
             let square = influence * influence;
             let noise = sample.noise;
@@ -29,9 +31,12 @@ impl Calibrated {
                 * (sample.u_independent * sample.u_independent - noise.read - noise.quantisation)
                     .max(0.0);
             readback += square * moved;
-            rest += square * excess;
+            let stated = sample.u_independent * sample.u_independent + moved;
+            rest += square * (variance - stated);
         }
-        let whole = fit.exitance().u_independent.powi(2);
+        let parts = fit.contributions();
+        let missed = parts.iter().find(|part| part.name == "truncation").map_or(0.0, |part| part.u);
+        let whole = fit.exitance().u_independent.powi(2) - missed * missed;
         let smoothing = whole - (shot + read + quantisation + readback + rest);
         // The levels are those of the last pass, the variances those of the one before.
         let smoothing = if smoothing > ROUNDING * whole { smoothing } else { 0.0 };

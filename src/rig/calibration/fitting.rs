@@ -45,7 +45,9 @@ impl Calibrated {
             return Err(FitError::Nuisance { name: "drift", missing });
         }
         let flown = self.flown(&input);
-        let ruled = fit::fit_wished(&input.readings(&flown), region, wish, optics)?;
+        let readings = input.readings(&flown);
+        let ruled = fit::fit_wished(&readings, region, wish, optics)?;
+        let ruled = ruled.with_truncation(&readings, optics)?;
         Ok(self.fitted(input, ruled, region, optics))
     }
 
@@ -63,10 +65,6 @@ impl Calibrated {
         Ok(self.fitted(input, ruled, region, optics))
     }
 
-    fn flown(&self, input: &FitInput) -> Vec<Option<(Ray, Ray)>> {
-        input.places.iter().map(|place| self.samples[*place].flown()).collect()
-    }
-
     fn fitted(
         &self,
         input: FitInput,
@@ -79,6 +77,11 @@ impl Calibrated {
         let resolves = Resolves::of(&samples, region, fit.basis(), optics);
         let n_excluded = self.samples.len() - samples.len();
         Fitted { fit, choice, resolves, n_excluded, places, drift, symmetry, nonnegative }
+    }
+
+    /// The ways of the input's samples.
+    fn flown(&self, input: &FitInput) -> Vec<Option<(Ray, Ray)>> {
+        input.places.iter().map(|place| self.samples[*place].flown()).collect()
     }
 
     /// What was known when `count` samples had been taken.

@@ -1,0 +1,169 @@
+//! What a fit's functions can't follow, in the u of everything that follows from the fit.
+//!
+//! Beside the reported fit stands a wider model of the same readings: the fit's functions, as free as
+//! they are in the fit, and finer ones beyond them, held by a prior in which a function of degree n
+//! has the variance (1 + n)^(-2 power)/λ. Power and λ are those under which the readings are likeliest
+//! (restricted maximum likelihood, as for [`crate::choose`]). Given the readings, the field is then
+//! normal about the wider model's mean with its covariance Σ, and the reported fit lies off that mean
+//! by a known field. A linear functional f of the reported fit has the mean square error
+//!
+//! ```text
+//! (f(fit) - f(wider))² + f Σ fᵀ
+//! ```
+//!
+//! Σ = S Sᵀ with S upper triangular, the fit's own functions first: its first columns are what noise
+//! does to the fit, the others are fields that the fit misses. These and the difference of the two
+//! fits are the *missed fields*, one u of an independent component each.
+//!
+//! Where finer functions make the readings no likelier there is no truncation to speak of, and the
+//! fit stays as it is. What is finer than all readings nothing here can know.
+
+mod likeliest;
+mod wider;
+
+use crate::basis::Basis;
+use crate::beam::Optics;
+use crate::beam::design::Design;
+use crate::grid::Grid;
+use crate::penalty::Prior;
+use crate::solve::{levels, needs_a_side, sensitivities};
+use crate::weights::Settled;
+use crate::{Angular, BasisSpec, Common, Fit, FitError, Influence, Position, Ray, Sample};
+use wider::Wider;
+
+/// What a fit misses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truncation {
+    /// The finer functions.
+    pub beyond: BasisSpec,
+    /// One u of an independent component each: numbers over the fit's functions, then over the finer
+    /// ones. The field that they make is what the reported fit may be off by.
+    pub missed: Vec<Vec<f64>>,
+    /// How much likelier the readings are with the finer functions: twice the logarithm of the ratio
+    /// of marginal likelihoods.
+    pub gain: f64,
+}
+
+impl Fit {
+    /// The fit with what its functions can't follow in every u. To be called with what
+    /// [`fit_flown`](crate::fit_flown) made the fit of. A fit that nothing finer makes likelier is
+    /// left without [`Parts::truncation`]; one that was stored and taken up again stays as it is, as
+    /// does one in a chart other than the surface one.
+    /// Costs one or two passes of a design that is two to five times as wide as the fit's.
+    pub fn with_truncation(
+        self,
+        samples: &[Sample],
+        flown: &[Option<(Ray, Ray)>],
+        common: &[Common],
+        optics: Option<&Optics>,
+    ) -> Result<Self, FitError> {
+        let Some(influence) = self.influence() else { return Ok(self) };
+        let Some(spec) = finer(&self, samples) else { return Ok(self) };
+        if influence.variances.len() != samples.len() {
+            return Ok(self);
+        }
+        let beyond = Basis::new(spec, *self.region())?;
+        let own = Design::new(samples, self.functions(), optics)?.in_flight(flown);
+        let design = Design::new(samples, &beyond, optics)?.in_flight(flown);
+        let shared = Shared::of(&self, &own, influence, common)?;
+        let wider = Wider {
+            own,
+            prior: Prior::new(self.functions(), self.penalty())?,
+            shared,
+            values: &influence.values,
+            beyond: design,
+            kept: kept(self.basis(), spec),
+        };
+        let (joint, found) = wider.likeliest(influence)?;
+        wider.widen(&self, joint, &found)
+    }
+}
+
+/// What samples share, as far as it shows in the residuals: what it explains is neither noise nor
+/// truncation.
+struct Shared {
+    /// The change of every value by one u of each component.
+    sides: Vec<Vec<f64>>,
+    /// The fit's shift by it.
+    shifts: Vec<Vec<f64>>,
+}
+
+impl Shared {
+    fn of(
+        fit: &Fit,
+        own: &Design<'_>,
+        influence: &Influence,
+        common: &[Common],
+    ) -> Result<Self, FitError> {
+        let coefficients = fit.coefficients().to_vec();
+        let levels = levels(own, &coefficients);
+        let settled = Settled::known(coefficients, levels, Vec::new(), Vec::new());
+        let shifts = &fit.parts().shifts;
+        // What was fitted along, the fit is already corrected for.
+        let none = vec![0.0; own.basis().len()];
+        let mut shared =
+            Self { sides: influence.columns.clone(), shifts: vec![none; influence.columns.len()] };
+        for common in common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, own)) {
+            let Some(shift) = shifts.iter().find(|shift| shift.name == common.name) else {
+                continue;
+            };
+            let side = sensitivities(own, &settled, &[common])?.pop().unwrap_or_default();
+            if side.iter().any(|value| *value != 0.0) {
+                shared.sides.push(side);
+                shared.shifts.push(shift.shift.clone());
+            }
+        }
+        Ok(shared)
+    }
+}
+
+/// Functions that follow what a fit's own can't.
+fn finer(fit: &Fit, samples: &[Sample]) -> Option<BasisSpec> {
+    let own = fit.basis();
+    let degree = match own.angular {
+        Angular::Zernike { degree, .. } | Angular::EvenHarmonics { degree } => degree,
+        Angular::Hemispherical { degree } => degree + 2,
+        Angular::Splines { .. } => OF_SPLINES,
+        Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
+    };
+    let grid = Grid::of(samples, fit.region());
+    let distinct = grid.x_m.len().max(grid.y_m.len());
+    let position = own.position.degree().unwrap_or(0);
+    let position = position.max((position + 1).min(distinct.saturating_sub(1)));
+    let spec = |degree| BasisSpec {
+        angular: Angular::Zernike { degree, cosine_columns: COSINE_COLUMNS },
+        position: Position::Legendre { degree: position },
+    };
+    (degree + 2..=degree + DEGREES).rev().map(spec).find(|spec| spec.len() <= FUNCTIONS_MAX)
+}
+
+/// Those of the finer functions that the fit doesn't have itself.
+fn kept(own: BasisSpec, beyond: BasisSpec) -> Vec<usize> {
+    let width = beyond.angular.len();
+    let all = 0..beyond.len();
+    let (Angular::Zernike { degree, cosine_columns }, Position::Legendre { .. }) =
+        (own.angular, own.position)
+    else {
+        return all.collect();
+    };
+    let polynomials = width - COSINE_COLUMNS;
+    let is_own = |k: &usize| {
+        let (q, j) = (k / width, k % width);
+        let is_direction = if j < polynomials {
+            j < (degree + 1) * (degree + 2) / 2
+        } else {
+            j - polynomials < cosine_columns
+        };
+        is_direction && q < own.position.len()
+    };
+    all.filter(|k| !is_own(k)).collect()
+}
+
+/// Degrees beyond the fit's own at most.
+const DEGREES: usize = 8;
+/// Of the finer functions beside splines.
+const OF_SPLINES: usize = 12;
+/// Finer functions at most.
+const FUNCTIONS_MAX: usize = 320;
+/// Against slow convergence at the horizon.
+const COSINE_COLUMNS: usize = 2;

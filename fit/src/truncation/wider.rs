@@ -1,0 +1,279 @@
+//! The wider model of a fit's readings: the fit's functions, what samples share, and finer functions,
+//! under noise as it is stated or as the fit took it; and what the likeliest says of the fit.
+
+use super::likeliest::{Hold, Likeliest, POWER, Shares};
+use super::{COSINE_COLUMNS, Shared, Truncation};
+use crate::basis::dot;
+use crate::beam::design::Design;
+use crate::fitted::Parts;
+use crate::penalty::{Prior, Roughness};
+use crate::triangle::{Solution, Triangle};
+use crate::weights::has_unknown;
+use crate::{Fit, FitError, Influence};
+use faer::Mat;
+use std::ops::RangeInclusive;
+
+/// The fit's functions and finer ones.
+pub(super) struct Wider<'s> {
+    pub(super) own: Design<'s>,
+    /// What is held against the fit's own functions.
+    pub(super) prior: Prior,
+    pub(super) shared: Shared,
+    /// What the samples count as having read.
+    pub(super) values: &'s [f64],
+    pub(super) beyond: Design<'s>,
+    /// The finer functions that aren't the fit's own.
+    pub(super) kept: Vec<usize>,
+}
+
+/// All readings under some variances: a triangle of the fit's functions, what samples share, the
+/// finer functions, and the values.
+pub(super) struct Joint {
+    pub(super) triangle: Triangle,
+    /// With what is known of the fit's own functions and of what samples share.
+    pub(super) solution: Solution,
+    pub(super) variances: Vec<f64>,
+}
+
+impl Wider<'_> {
+    /// The likeliest model, with finer functions where they make the readings likelier than chance
+    /// would.
+    pub(super) fn likeliest(&self, influence: &Influence) -> Result<(Joint, Likeliest), FitError> {
+        let Influence { variances, excess, stated, .. } = influence;
+        let joint = self.joint(variances)?;
+        if *excess == 0.0 {
+            let found = self.at_scales(&joint, 1.0..=1.0)?;
+            return Ok((joint, found));
+        }
+        // The misfit may be what the functions can't follow, noise that isn't stated, or both.
+        let is_unknown = has_unknown(self.own.samples());
+        let ratios = stated.iter().zip(variances).map(|(stated, all)| stated / all);
+        let least = ratios.fold(1.0, f64::min);
+        let least = if is_unknown { SCALE_LEAST } else { least.max(SCALE_LEAST) };
+        let found = self.at_scales(&joint, least..=1.0)?;
+        if is_unknown {
+            return Ok((joint, found));
+        }
+        let other = self.joint(stated)?;
+        let by_stated = self.at_scales(&other, 1.0..=f64::MAX)?;
+        let is_better = by_stated.deviance < found.deviance;
+        Ok(if is_better { (other, by_stated) } else { (joint, found) })
+    }
+
+    /// One pass of all rows, each divided by its standard uncertainty.
+    fn joint(&self, variances: &[f64]) -> Result<Joint, FitError> {
+        let Self { own, beyond, kept, shared, values, .. } = self;
+        let (p, q) = (own.basis().len(), kept.len());
+        let known = self.known();
+        let mut triangle = Triangle::new(known + q, 1);
+        let (mut own_room, mut room) = (own.room(), beyond.room());
+        let mut row = vec![0.0; known + q + 1];
+        let mut all = vec![0.0; beyond.basis().len()];
+        for (i, (value, variance)) in values.iter().zip(variances).enumerate() {
+            let weight = 1.0 / variance.sqrt();
+            if !weight.is_finite() {
+                return Err(FitError::OutOfRange);
+            }
+            if weight == 0.0 {
+                continue;
+            }
+            own.row(i, &mut own_room, &mut row[..p]);
+            beyond.row(i, &mut room, &mut all);
+            for (out, side) in row[p..].iter_mut().zip(&shared.sides) {
+                *out = side[i];
+            }
+            for (out, k) in row[known..].iter_mut().zip(kept) {
+                *out = all[*k];
+            }
+            row[known + q] = *value;
+            row.iter_mut().for_each(|value| *value *= weight);
+            triangle.absorb(&row);
+        }
+        let mut held = triangle.clone();
+        self.absorb_known(&mut held);
+        let solution = held.solve().ok_or(FitError::OutOfRange)?;
+        Ok(Joint { triangle, solution, variances: variances.to_vec() })
+    }
+
+    /// The fit's functions and what samples share.
+    fn known(&self) -> usize {
+        self.own.basis().len() + self.shared.sides.len()
+    }
+
+    /// What is held against the fit's own functions, and that what samples share is one u.
+    fn absorb_known(&self, triangle: &mut Triangle) {
+        let (p, q, known) = (self.own.basis().len(), self.kept.len(), self.known());
+        self.prior.absorb_into(triangle, known - p + q + 1);
+        let mut row = vec![0.0; known + q + 1];
+        for k in p..known {
+            row[k] = 1.0;
+            triangle.absorb(&row);
+            row[k] = 0.0;
+        }
+    }
+
+    /// Of the variances, and of the fit's own functions.
+    fn determinants(&self, joint: &Joint) -> f64 {
+        let r = joint.solution.r();
+        let own = (0..self.known()).map(|i| 2.0 * libm::log(r[(i, i)].abs()));
+        let counted = joint.variances.iter().filter(|variance| variance.is_finite());
+        own.chain(counted.map(|variance| libm::log(*variance))).sum()
+    }
+
+    /// The likeliest power and strength, with the variances times a number within the range; no
+    /// finer functions where they gain no more than chance does.
+    fn at_scales(&self, joint: &Joint, scales: RangeInclusive<f64>) -> Result<Likeliest, FitError> {
+        let counted = joint.variances.iter().filter(|variance| variance.is_finite());
+        let (p, n) = (self.own.basis().len(), counted.count() as f64);
+        let free = if self.prior.is_none() { n - p as f64 } else { n };
+        let rest = joint.solution.residual_squares(0);
+        let below = joint.solution.rotated(0).split_off(self.known());
+        let alone = Likeliest::alone(rest + dot(&below, &below), free, &scales);
+        let tried = |hold: Hold| {
+            let shares = Shares::of(&joint.solution, self.known(), &self.root(hold)?)?;
+            let found = shares.likeliest(rest, free, &scales);
+            Ok::<_, FitError>(found.map(|found| Likeliest { hold, ..found }))
+        };
+        let mut best = Likeliest { ..alone };
+        for around in AROUND {
+            best = best.or(tried(Hold { power: POWER, around, is_flat: false })?);
+        }
+        for power in OTHER_POWERS {
+            best = best.or(tried(Hold { power, ..best.hold })?);
+        }
+        best = best.or(tried(Hold { is_flat: true, ..best.hold })?);
+        let gain = alone.deviance - best.deviance;
+        let mut found = if gain > GAIN_MIN { Likeliest { gain, ..best } } else { alone };
+        found.deviance += self.determinants(joint);
+        Ok(found)
+    }
+
+    /// The square root of what is held against the finer functions.
+    fn root(&self, hold: Hold) -> Result<Mat<f64>, FitError> {
+        let basis = self.beyond.basis();
+        let mut root = Roughness::new(basis, hold.power)?.of_functions(&self.kept);
+        // A column of cos θ is new by what no polynomial of the fit's own degree follows of it.
+        let directions = basis.directions();
+        let degrees = self.kept.iter().map(|k| directions.degree(k % basis.angular_len()));
+        let polynomials = basis.angular_len() - COSINE_COLUMNS;
+        let is_cosine = |k: usize| k % basis.angular_len() >= polynomials;
+        let first = degrees
+            .clone()
+            .zip(&self.kept)
+            .filter(|(_, k)| !is_cosine(**k) && **k < polynomials)
+            .map(|(d, _)| d)
+            .min()
+            .unwrap_or(0);
+        for (j, (degree, k)) in degrees.zip(&self.kept).enumerate() {
+            if hold.is_flat && is_cosine(*k) && degree < first {
+                let more = libm::pow((1.0 + first as f64) / (1.0 + degree as f64), hold.power);
+                root.col_as_slice_mut(j).iter_mut().for_each(|value| *value *= more);
+            }
+        }
+        for (j, k) in self.kept.iter().enumerate() {
+            let (q, j_direction) = (k / basis.angular_len(), k % basis.angular_len());
+            if q > 0 || basis.directions().order(j_direction) != 0 {
+                root.col_as_slice_mut(j).iter_mut().for_each(|value| *value *= hold.around);
+            }
+        }
+        Ok(root)
+    }
+
+    /// The fit with the likeliest model's u.
+    pub(super) fn widen(
+        &self,
+        fit: &Fit,
+        joint: Joint,
+        found: &Likeliest,
+    ) -> Result<Fit, FitError> {
+        let (p, q, known) = (self.own.basis().len(), self.kept.len(), self.known());
+        let is_wider = found.strength.is_finite();
+        if !is_wider && fit.influence().is_some_and(|i| i.excess == 0.0) {
+            return Ok(fit.clone());
+        }
+        let mut triangle = joint.triangle.scaled(1.0 / found.scale.sqrt());
+        self.absorb_known(&mut triangle);
+        // Without finer functions any hold on them leaves the fit's own columns alone.
+        let strength = if is_wider { found.strength } else { 1.0 };
+        let root = self.root(found.hold)?;
+        let mut row = vec![0.0; known + q + 1];
+        for i in 0..q {
+            for j in 0..q {
+                row[known + j] = strength.sqrt() * root[(i, j)];
+            }
+            triangle.absorb(&row);
+        }
+        let solution = triangle.solve().ok_or(FitError::OutOfRange)?;
+        let factor = solution.inverse();
+        let truncation = is_wider.then(|| {
+            let columns = known..known + q;
+            let columns = columns.map(|j| self.spread(&factor[j * (j + 1) / 2..][..=j]));
+            let off = self.off(fit, &solution.unknowns(0));
+            Truncation {
+                beyond: self.beyond.basis().spec(),
+                missed: std::iter::once(off).chain(columns).collect(),
+                gain: found.gain,
+            }
+        });
+        let factor = factor[..p * (p + 1) / 2].to_vec();
+        let variances: Vec<f64> =
+            joint.variances.iter().map(|variance| variance * found.scale).collect();
+        let rough = self.rough(fit, &variances);
+        let influence =
+            fit.influence().map(|influence| influence.under(variances, &self.own, &factor));
+        let mut parts = Parts { factor, truncation, ..fit.parts().clone() };
+        if is_wider {
+            parts.model.truncation = rough;
+        }
+        let mut wider = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
+        if let Some(influence) = influence {
+            wider = wider.with_influence(influence);
+        }
+        if let Some(weighed) = fit.weighed() {
+            wider = wider.with_weighed(weighed.clone());
+        }
+        Ok(wider)
+    }
+
+    /// Standard deviation of what is left beyond the stated noise. Where finer functions are called
+    /// for at all, it is taken for what is finer still: the field's own, along a ray.
+    fn rough(&self, fit: &Fit, variances: &[f64]) -> f64 {
+        let Some(influence) = fit.influence() else { return 0.0 };
+        if has_unknown(self.own.samples()) {
+            return 0.0;
+        }
+        let both = variances.iter().zip(&influence.stated).filter(|(all, _)| all.is_finite());
+        let beyond: f64 = both.map(|(all, stated)| all - stated).sum();
+        (beyond / variances.len() as f64).max(0.0).sqrt()
+    }
+
+    /// The reported fit less the wider one, but for what the shared components do to both.
+    fn off(&self, fit: &Fit, wider: &[f64]) -> Vec<f64> {
+        let mut off = self.spread(&wider.iter().map(|value| -value).collect::<Vec<f64>>());
+        off.iter_mut().zip(fit.coefficients()).for_each(|(off, own)| *off += own);
+        for (times, shift) in wider[self.own.basis().len()..].iter().zip(&self.shared.shifts) {
+            off.iter_mut().zip(shift).for_each(|(off, shift)| *off -= times * shift);
+        }
+        off
+    }
+
+    /// A field over the fit's functions and the kept ones as one over all functions.
+    fn spread(&self, narrow: &[f64]) -> Vec<f64> {
+        let p = self.own.basis().len();
+        let mut wide = vec![0.0; p + self.beyond.basis().len()];
+        wide[..p].copy_from_slice(&narrow[..p]);
+        for (value, k) in narrow[self.known()..].iter().zip(&self.kept) {
+            wide[p + k] = *value;
+        }
+        wide
+    }
+}
+
+/// Other powers that are tried.
+const OTHER_POWERS: [f64; 1] = [2.0];
+/// See [`Hold::around`].
+const AROUND: [f64; 4] = [1.0, 10.0, 100.0, 1e4];
+/// A gain that chance gives once in some hundred fits.
+const GAIN_MIN: f64 = 8.0;
+/// Of variances that nothing was stated about.
+const SCALE_LEAST: f64 = 1e-12;

@@ -1,0 +1,149 @@
+//! What a basis can't follow is in every u, no wider than it has to be, and only where it is there.
+
+#[allow(dead_code)]
+mod scenes;
+
+use fit::{BasisSpec, Common, Fit, Noise, Ray, Sample, Shift};
+use scenes::{Die, REGION, raster_rays};
+use std::f64::consts::PI;
+
+const BASIS: BasisSpec = BasisSpec::zernike(6, 0);
+const SIGMA: f64 = 2e-4;
+
+/// Readings of a field that is the same everywhere and all round.
+fn readings(field: impl Fn(f64) -> f64, die: &mut Die) -> Vec<Sample> {
+    let noise = Noise::Fixed { variance: SIGMA * SIGMA };
+    let sample = |ray: &Ray| {
+        let value = field(ray.theta_rad) + SIGMA * die.normal();
+        Sample { ray: *ray, value, noise }
+    };
+    raster_rays(&REGION, 10, 16, 1).iter().map(sample).collect()
+}
+
+fn plain(samples: &[Sample], common: &[Common]) -> Fit {
+    fit::fit(samples, &REGION, BASIS, common).unwrap()
+}
+
+/// cosⁿ: only of even n a polynomial on the disk.
+fn lobe(exponent: f64) -> impl Fn(f64) -> f64 {
+    move |theta_rad| libm::pow(libm::cos(theta_rad), exponent)
+}
+
+/// (value - truth, u) of M, of M within 60°, and of I and L in two directions.
+fn asked(fit: &Fit, exponent: f64) -> Vec<(f64, f64)> {
+    let whole = 2.0 * PI / (exponent + 2.0);
+    let cone = PI / 3.0;
+    let within = whole * (1.0 - libm::pow(libm::cos(cone), exponent + 2.0));
+    let mut all = vec![(fit.exitance(), whole), (fit.exitance_within(cone).unwrap(), within)];
+    for (theta_rad, phi_rad) in [(0.1, 0.3), (0.9, 2.0)] {
+        let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad };
+        let radiance = lobe(exponent)(theta_rad);
+        all.push((fit.radiance(&ray), radiance));
+        let towards = radiance * REGION.area_m2() * libm::cos(theta_rad);
+        all.push((fit.intensity(theta_rad, phi_rad), towards));
+    }
+    all.into_iter().map(|(estimate, truth)| (estimate.value - truth, estimate.u)).collect()
+}
+
+#[test]
+fn where_the_basis_limits_intervals_hold_the_truth_and_are_not_huge() {
+    let mut die = Die::new(7);
+    let (mut with, mut without) = (Vec::new(), Vec::new());
+    for run in 0..60 {
+        // From 0.6 to 7: by the golden ratio, so that they spread evenly.
+        let exponent = 0.6 + 6.4 * (f64::from(run) * 0.618_034).fract();
+        let samples = readings(lobe(exponent), &mut die);
+        let fit = plain(&samples, &[]);
+        without.push(asked(&fit, exponent));
+        let fit = fit.with_truncation(&samples, &[], &[], None).unwrap();
+        with.push(asked(&fit, exponent));
+    }
+    let coverage = |runs: &[Vec<(f64, f64)>]| {
+        let all: Vec<bool> =
+            runs.iter().flatten().map(|(error, u)| error.abs() <= 1.96 * u).collect();
+        all.iter().filter(|holds| **holds).count() as f64 / all.len() as f64
+    };
+    assert!(coverage(&without) < 0.9, "the basis follows too well: {}", coverage(&without));
+    assert!(coverage(&with) >= 0.93, "{}", coverage(&with));
+    for quantity in 0..with[0].len() {
+        let mut u: Vec<f64> = with.iter().map(|run| run[quantity].1).collect();
+        u.sort_by(f64::total_cmp);
+        let squares: f64 = with.iter().map(|run| run[quantity].0.powi(2)).sum();
+        let rms = (squares / with.len() as f64).sqrt();
+        assert!(u[u.len() / 2] <= 2.0 * rms, "{quantity}: median u {}, rms {rms}", u[u.len() / 2]);
+    }
+}
+
+#[test]
+fn where_the_basis_follows_nothing_is_added() {
+    let mut die = Die::new(3);
+    let mut wider = 0;
+    for run in 0..60 {
+        let exponent = [0.0, 2.0, 4.0, 6.0][run % 4];
+        let samples = readings(lobe(exponent), &mut die);
+        let fit = plain(&samples, &[]);
+        let u = fit.exitance().u;
+        let fit = fit.with_truncation(&samples, &[], &[], None).unwrap();
+        if fit.parts().truncation.is_some() {
+            wider += 1;
+        } else {
+            assert!((fit.exitance().u / u - 1.0).abs() < 0.1, "{} {u}", fit.exitance().u);
+        }
+    }
+    assert!(wider <= 3, "{wider} of 60");
+}
+
+#[test]
+fn a_shift_that_all_rays_share_is_no_truncation() {
+    // What an arm that swings through the zenith is off by has another sign on the far side: no
+    // smooth field shows it, and the residuals are far beyond the noise.
+    let off_rad = 1e-3;
+    let seen = move |theta_rad: f64, phi_rad: f64| {
+        if phi_rad.rem_euclid(2.0 * PI) < PI { theta_rad + off_rad } else { theta_rad - off_rad }
+    };
+    let noise = Noise::Fixed { variance: SIGMA * SIGMA };
+    let mut die = Die::new(5);
+    let rays = raster_rays(&REGION, 10, 16, 1);
+    let sample = |ray: &Ray| {
+        let value = lobe(4.0)(seen(ray.theta_rad, ray.phi_rad)) + SIGMA * die.normal();
+        Sample { ray: *ray, value, noise }
+    };
+    let samples: Vec<Sample> = rays.iter().map(sample).collect();
+    let zero = Common {
+        name: "theta zero".into(),
+        u: off_rad,
+        shift: Shift::Ray(Box::new(move |_, ray| Ray {
+            theta_rad: seen(ray.theta_rad, ray.phi_rad),
+            ..*ray
+        })),
+    };
+    let fit = plain(&samples, std::slice::from_ref(&zero));
+    let noise_alone = {
+        let quiet = readings(lobe(4.0), &mut Die::new(5));
+        plain(&quiet, &[]).exitance().u_independent
+    };
+    assert!(fit.exitance().u_independent > 1.2 * noise_alone, "no misfit to begin with");
+    let fit = fit.with_truncation(&samples, &[], &[zero], None).unwrap();
+    assert!(fit.parts().truncation.is_none());
+    let ratio = fit.exitance().u_independent / noise_alone;
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+}
+
+#[test]
+fn what_was_missed_is_stored_with_the_fit() {
+    let samples = readings(lobe(3.0), &mut Die::new(1));
+    let fit = plain(&samples, &[]).with_truncation(&samples, &[], &[], None).unwrap();
+    assert!(fit.parts().truncation.is_some());
+    let again = Fit::from_parts(fit.parts().clone()).unwrap();
+    assert_eq!(asked(&again, 3.0), asked(&fit, 3.0));
+    let budget = fit.contributions();
+    let squares: f64 = budget.iter().map(|part| part.u * part.u).sum();
+    assert!((squares.sqrt() / fit.exitance().u - 1.0).abs() < 1e-12);
+    assert!(budget.iter().any(|part| part.name == "truncation" && part.u > 0.0));
+    // A field of another length belongs to another basis.
+    let mut parts = fit.parts().clone();
+    if let Some(truncation) = &mut parts.truncation {
+        truncation.missed[0].pop();
+    }
+    assert!(matches!(Fit::from_parts(parts), Err(fit::FitError::Parts { .. })));
+}
