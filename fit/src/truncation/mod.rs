@@ -75,7 +75,7 @@ impl Fit {
             kept: kept(self.basis(), spec),
         };
         let (joint, found) = wider.likeliest(influence)?;
-        wider.widen(&self, joint, &found)
+        wider.widen(&self, &joint, &found)
     }
 }
 

@@ -86,7 +86,9 @@ impl Wider<'_> {
                 *out = all[*k];
             }
             row[known + q] = *value;
-            row.iter_mut().for_each(|value| *value *= weight);
+            for value in row.iter_mut() {
+                *value *= weight;
+            }
             triangle.absorb(&row);
         }
         let mut held = triangle.clone();
@@ -183,7 +185,7 @@ impl Wider<'_> {
     pub(super) fn widen(
         &self,
         fit: &Fit,
-        joint: Joint,
+        joint: &Joint,
         found: &Likeliest,
     ) -> Result<Fit, FitError> {
         let (p, q, known) = (self.own.basis().len(), self.kept.len(), self.known());
