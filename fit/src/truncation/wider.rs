@@ -86,7 +86,7 @@ impl Wider<'_> {
                 *out = all[*k];
             }
             row[known + q] = *value;
-            for value in row.iter_mut() {
+            for value in &mut row {
                 *value *= weight;
             }
             triangle.absorb(&row);

@@ -141,7 +141,7 @@ fn study(
         if unpinned {
             drawn = drawn.unpinned();
         }
-        run_one(drawn, draws.seed(), &folder)
+        run_one(&drawn, draws.seed(), &folder)
             .map_err(|failure| format!("{}, run {}: {}", family.name(), entry.run, failure.text()))
     };
     let done = in_parallel(&entries, one);
@@ -222,7 +222,7 @@ fn in_parallel<T: Send>(entries: &[Entry], one: impl Fn(&Entry) -> T + Sync) -> 
 }
 
 /// One run of a scene as drawn, from the wire to the scores.
-fn run_one(drawn: Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run), Failure> {
+fn run_one(drawn: &Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run), Failure> {
     let input = |role, name: &str, bytes: &[u8]| Input {
         role,
         name: name.to_owned(),
