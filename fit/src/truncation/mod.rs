@@ -47,7 +47,7 @@ pub struct Truncation {
 impl Fit {
     /// The fit with what its functions can't follow in every u. To be called with what
     /// [`fit_flown`](crate::fit_flown) made the fit of. A fit that nothing finer makes likelier is
-    /// left without [`Parts::truncation`]; one that was stored and taken up again stays as it is, as
+    /// left without [`Parts::truncation`](crate::Parts::truncation); one that was stored and taken up again stays as it is, as
     /// does one in a chart other than the surface one.
     /// Costs one or two passes of a design that is two to five times as wide as the fit's.
     pub fn with_truncation(
