@@ -54,7 +54,7 @@ impl Strategy {
     /// Sweeps take the meridians and the places of a grid; where the schedule has none, as many as
     /// the fit's degrees need. A grid takes the sweeps' meridians and places, and two circles within
     /// the narrowest feature. An adaptive plan takes the places of either, and asks for 2 % of the
-    /// radiance.
+    /// radiance, and leaves the fit's basis to the readings.
     pub fn changes(self, plan: &Plan) -> Option<Vec<Change>> {
         match (Self::of(&plan.schedule), self) {
             (from, to) if from == to => Some(Vec::new()),
@@ -127,6 +127,8 @@ fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
     .map(|key| Change::remove("schedule", key))
     .collect();
     changes.push(Change::remove("stop", "exitance_relative"));
+    // Plain least squares of a given degree wants a grid as fine as that everywhere.
+    changes.push(Change::remove("fit", "angular_degree"));
     changes.push(Change::set("schedule", "kind", "\"adaptive\""));
     changes.push(Change::set("schedule", "x_count", x_count));
     changes.push(Change::set("schedule", "y_count", y_count));

@@ -141,6 +141,13 @@ impl Between {
         chosen
     }
 
+    /// Whole candidates, as many as that and one at least: spread evenly over azimuths and places.
+    pub(super) fn evenly(&self, count: f64) -> Vec<Meridian> {
+        let far = |i: &usize| (*i as f64) < count.max(1.0);
+        let taken = self.candidates.iter().enumerate().take_while(|(i, _)| far(i));
+        taken.map(|(_, candidate)| *candidate).collect()
+    }
+
     /// Time to come to a candidate from the nearest of the places where the axes will have stood.
     fn way_s(&self, terms: &Terms<'_>, stands: &[Latched], candidate: usize) -> f64 {
         let to = counts(terms, &self.candidates[candidate]);

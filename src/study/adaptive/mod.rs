@@ -333,7 +333,15 @@ impl State<'_> {
         let wanted_s = (GROWTH * so_far_s).max(SWEEPS_LEAST * sweep_s).min(left_s);
         // Of a round's time a part goes to checks, which are whole sweeps.
         let part = 1.0 / (SWEEPS_PER_CHECK as f64 + 1.0);
-        let mut chosen = self.between.choose(terms, after.here, wanted_s * (1.0 - part));
+        let chosen_s = wanted_s * (1.0 - part);
+        // Where the interpolation is good enough and the fit is not, its functions lack meridians:
+        // whole ones, evenly.
+        let asked = terms.adaptive.radiance_relative.unwrap_or(0.0);
+        let mut chosen = if self.between.relative() <= asked {
+            self.between.evenly(chosen_s / sweep_s)
+        } else {
+            self.between.choose(terms, after.here, chosen_s)
+        };
         let mut checks = terms.further_checks(steps, (chosen.len() / SWEEPS_PER_CHECK).max(1));
         while !(chosen.is_empty() && checks.is_empty()) {
             let wanted: Vec<Meridian> = chosen.iter().chain(&checks).copied().collect();
