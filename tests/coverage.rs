@@ -40,3 +40,53 @@ fn what_makes_no_sense_is_refused_before_anything_is_run() {
     study(&["--runs", "1"]).refused(&["from 2 to 1000000"]);
     assert_eq!(bench.names(), Vec::<String>::new());
 }
+
+/// Radiances with their u along a few rays of a run by this seed.
+fn radiances(bench: &Bench, seed: u64) -> Vec<(f64, f64)> {
+    let (seed, out) = (seed.to_string(), format!("run-{seed}"));
+    bench.gonio(&["run", "plan.toml", "--seed", &seed, "--out", &out]).well();
+    let said = bench.gonio(&["fit", &out, "--at", "rays.csv"]).well();
+    let number = |field: Option<&str>| field.unwrap().parse::<f64>().unwrap();
+    let pair = |line: &str| (number(line.split(',').nth(4)), number(line.split(',').nth(5)));
+    said.out.lines().skip(1).map(pair).collect()
+}
+
+#[test]
+fn a_rig_that_stands_askew_is_off_by_what_its_alignment_says() {
+    // A slope in x times the square of the cosine: the basis follows it.
+    let scene = "[[emitter]]\nkind = \"image\"\nfile = \"ramp.pgm\"\nexponent = 2\nx_mm = [-60, 60]\n\
+                 y_mm = [-60, 60]\nradiance_w_per_m2_sr = 50\n";
+    let columns: Vec<String> = (0..4099).map(|i| (9_000 + 12 * i).to_string()).collect();
+    let bench = || {
+        let rays = "x_mm,y_mm,theta_deg,phi_deg\n0,0,40,0\n0,0,50,75\n0,0,60,150\n0,0,45,-120\n";
+        Bench::small()
+            .having("scene.toml", scene)
+            .having("ramp.pgm", format!("P2\n4099 1\n65535\n{}\n", columns.join("\n")))
+            .having("rays.csv", rays)
+    };
+    // Nothing is uncertain but the alignment.
+    let known: String = (bench().text("rig.toml").lines())
+        .map(|line| match line.split_once(" = ") {
+            Some((key, _)) if key.starts_with("u_") => format!("{key} = 0\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let straight = bench().having("rig.toml", &known);
+    let askew = bench().having("rig.toml", known).with(
+        "rig.toml",
+        "[link]",
+        "[alignment]\nu_offset_x_mm = 0.5\nu_offset_z_mm = 0.5\nu_tilt_deg = 0.3\n\n[link]",
+    );
+    let straight = radiances(&straight, 1);
+    let (mut squares, mut count) = (0.0, 0.0);
+    for seed in 1..=8 {
+        for ((value, u), (off, wider)) in straight.iter().zip(radiances(&askew, seed)) {
+            let own = (wider * wider - u * u).sqrt();
+            assert!(own > 1e-3 * value, "{u} {wider}");
+            squares += ((off - value) / own).powi(2);
+            count += 1.0;
+        }
+    }
+    let rms = (squares / count).sqrt();
+    assert!((0.6..1.5).contains(&rms), "{rms}");
+}

@@ -1,6 +1,6 @@
 //! What a rig file states, in the simulator's own terms: the one place where the two meet.
 
-use crate::rig::{Axis, Quantity, Readback, Rig};
+use crate::rig::{Alignment, Axis, Quantity, Readback, Rig};
 
 /// The rig as the simulator takes it: SI units and counts, no drawn truth yet.
 pub(crate) fn nominal(rig: &Rig) -> sim::Nominal {
@@ -19,8 +19,11 @@ pub(crate) fn nominal(rig: &Rig) -> sim::Nominal {
             u_pupil_radius_m: detector.u_pupil_radius_m,
             spot_radius_m: detector.spot_radius_m,
             u_spot_radius_m: detector.u_spot_radius_m,
-            responsivity_a_per_w: detector.responsivity,
-            u_responsivity_relative: detector.u_responsivity_relative,
+            // For the source's spectrum: what the host divides by, drawn with both uncertainties.
+            responsivity_a_per_w: detector.responsivity / detector.spectral_mismatch,
+            u_responsivity_relative: detector
+                .u_responsivity_relative
+                .hypot(detector.u_spectral_mismatch_relative),
             read_noise_a: detector.read_noise_a,
             gains: detector
                 .gains
@@ -34,6 +37,21 @@ pub(crate) fn nominal(rig: &Rig) -> sim::Nominal {
             adc_bits: detector.adc.bits,
             adc_rate_hz: detector.adc.rate_hz,
         },
+    }
+}
+
+/// What `[simulated]` says of the axes' alignment, and what the rig file states of it as uncertain: the
+/// simulated rig is off by a draw of both.
+pub(crate) fn misaligned(rig: &Rig, stated: sim::Misalignment) -> sim::Misalignment {
+    let more = |of: sim::Uncertain, u: f64| sim::Uncertain { u: of.u.hypot(u), ..of };
+    let Alignment { u_offset_m: [x, y, z], u_arm_axis_rad, u_beam_rad, u_tilt_rad } = rig.alignment;
+    let [at_x, at_y, at_z] = stated.axis_offset_m;
+    sim::Misalignment {
+        axis_offset_m: [more(at_x, x), more(at_y, y), more(at_z, z)],
+        arm_axis_rad: more(stated.arm_axis_rad, u_arm_axis_rad),
+        beam_rad: more(stated.beam_rad, u_beam_rad),
+        wobble_rad: more(stated.wobble_rad, u_tilt_rad),
+        ..stated
     }
 }
 

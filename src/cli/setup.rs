@@ -12,7 +12,7 @@ use super::adapting;
 use super::args::{EffectArgs, RigArgs};
 use super::failure::Failure;
 use super::inputs::{BUILT_IN, Inputs, beside};
-use super::nominal::nominal;
+use super::nominal::{misaligned, nominal};
 use crate::journal::{EffectWishes, Input, InputRole, Reader};
 use crate::plan::{Plan, PlanHash, Region, Sequence};
 use crate::rig::Rig;
@@ -354,7 +354,8 @@ pub(crate) fn stage_at(
 fn compile(scene: sim::Scene, rig: &Rig, terms: &sim::Terms) -> Result<Stage, Failure> {
     let root = rig.document().root();
     let simulated = root.table("simulated")?.map(sim::Simulated::read).transpose()?;
-    let simulated = simulated.unwrap_or_default();
+    let mut simulated = simulated.unwrap_or_default();
+    simulated.misalignment = misaligned(rig, simulated.misalignment);
     let faults = simulated.faults;
     let compiled = sim::compile(scene, nominal(rig), simulated, terms)
         .map_err(|error| refused(&error, rig))?;

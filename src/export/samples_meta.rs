@@ -112,6 +112,10 @@ impl SamplesMeta<'_> {
                 let (factor, unit) = file_unit(axis);
                 json!({"name": name, "u": u * factor, "unit": unit, "session": session})
             }
+            Effect::Alignment { of } => {
+                let (factor, unit) = if of.is_angle() { DEGREES } else { MILLIMETRES };
+                json!({"name": name, "u": u * factor, "unit": unit})
+            }
             Effect::Readback { axis } => {
                 let (factor, unit) = file_unit(axis);
                 json!({"name": name, "u": u * factor, "unit": unit, "shared_by": "position"})
@@ -163,10 +167,13 @@ fn axis(axis: &Axis) -> Value {
 /// From the program's unit of an axis to that of files, and its name.
 const fn file_unit(axis: AxisName) -> (f64, &'static str) {
     match axis {
-        AxisName::Theta | AxisName::Phi => (180.0 / std::f64::consts::PI, "deg"),
-        AxisName::X | AxisName::Y => (1e3, "mm"),
+        AxisName::Theta | AxisName::Phi => DEGREES,
+        AxisName::X | AxisName::Y => MILLIMETRES,
     }
 }
+
+const DEGREES: (f64, &str) = (180.0 / std::f64::consts::PI, "deg");
+const MILLIMETRES: (f64, &str) = (1e3, "mm");
 
 const COORDINATES: &str = "the sample's plane is z = 0, its outward normal +z, the origin on the \
 turntable's axis, x and y right-handed in the plane; (theta, phi) points from the sample to the \

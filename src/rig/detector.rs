@@ -70,6 +70,11 @@ pub struct Detector {
     pub responsivity: f64,
     /// Its relative standard uncertainty.
     pub u_responsivity_relative: f64,
+    /// The spectral mismatch correction factor (CIE S 017, 17-1224: by what a reading of the
+    /// source is multiplied, since the responsivity is that for the calibration's spectrum); 1 for none.
+    pub spectral_mismatch: f64,
+    /// Its relative standard uncertainty.
+    pub u_spectral_mismatch_relative: f64,
     /// Standard deviation of one ADC reading without light, referred to the input, ampere.
     pub read_noise_a: f64,
     /// The gain ranges, in the order in which the device numbers them; never empty.
@@ -194,6 +199,13 @@ impl Detector {
         u_m2_sr / self.throughput_m2_sr()
     }
 
+    /// The relative standard uncertainty of what all its readings are multiplied by, the range's
+    /// gain aside.
+    pub fn u_scale_relative(&self) -> f64 {
+        let current = libm::hypot(self.u_responsivity_relative, self.u_spectral_mismatch_relative);
+        libm::hypot(current, self.u_throughput_relative())
+    }
+
     /// Its beam, every ray through pupil and spot; an error only for lengths that the rig reader
     /// refuses.
     pub fn beam(&self) -> Result<Beam, DomainError> {
@@ -210,9 +222,10 @@ impl Detector {
         self.full_scale_a(gain) / self.adc.full_scale_counts()
     }
 
-    /// Ampere for one unit of radiance: responsivity times throughput.
+    /// Ampere for one unit of the source's radiance: responsivity times throughput, by the spectral
+    /// mismatch less.
     pub fn a_per_radiance(&self) -> f64 {
-        self.responsivity * self.throughput_m2_sr()
+        self.responsivity * self.throughput_m2_sr() / self.spectral_mismatch
     }
 
     /// The radiance at which the range is full, the dark current aside.

@@ -10,6 +10,7 @@ use radiometry::quantity::Throughput;
 use radiometry::throughput::CoaxialDisks;
 use spanned_toml::{Bounds, Document, Problem, Source, Table};
 
+use super::alignment::Alignment;
 use super::axis::{Approach, Axis, Readback};
 use super::detector::{Adc, Detector, Gain, Quantity};
 use super::{AXES, AxisName, Link, Rig};
@@ -26,6 +27,11 @@ const GAINS_MAX: usize = 64;
 const RATE_HZ_MAX: i64 = 10_000_000;
 /// A relative standard uncertainty of 1 means that nothing is known.
 const RELATIVE: Bounds = Bounds::between(0.0, 1.0);
+/// What is farther off, or leans more, is no uncertainty but a rig to be put right.
+const OFFSET_MM_MAX: f64 = 100.0;
+const LEAN_DEG_MAX: f64 = 10.0;
+/// The factor of a spectral mismatch: a number in per cent, or its distance from 1, is none.
+const MISMATCH: Bounds = Bounds::between(0.1, 10.0);
 /// Run-up of a one-sided axis, in the file's unit, where the file does not say.
 const RUN_UP_DEFAULT: f64 = 0.5;
 
@@ -35,6 +41,8 @@ impl Rig {
         let root = document.root();
         let name = root.required_text("name")?.to_owned();
         let axes = read_axes(&root.required_table("axes")?)?;
+        let alignment = root.table("alignment")?.map(read_alignment).transpose()?;
+        let alignment = alignment.unwrap_or_default();
         let detector = read_detector(root.required_table("detector")?)?;
         let link = Link::read(root.required_table("link")?)?;
         let is_simulated = matches!(link, Link::Simulated { .. });
@@ -49,7 +57,7 @@ impl Rig {
             ));
         }
         root.finish()?;
-        Ok(Self { name, axes, detector, link, document })
+        Ok(Self { name, axes, alignment, detector, link, document })
     }
 
     /// The built-in simulated rig, which `rig = "simulated"` names.
@@ -190,19 +198,41 @@ fn read_approach(table: &Table<'_>, run_up_key: &str) -> Result<(Approach, f64),
     }
 }
 
+/// The keys of `[alignment]`, each a standard uncertainty, 0 where absent; the table may be too.
+///
+/// `u_offset_x_mm`, `u_offset_y_mm`, `u_offset_z_mm`: of where the beam's axis passes the arm's axis,
+/// from where the turntable's axis meets the sample: across the arm's axis, along it, up ·
+/// `u_arm_axis_deg`: of the arm's axis out of the horizontal · `u_beam_deg`: of the beam out of the
+/// plane of the arm's swing · `u_tilt_deg`: of the turntable's top against its axis.
+fn read_alignment(table: Table<'_>) -> Result<Alignment, Problem> {
+    let read = |key: &str, most: f64| table.number(key, Bounds::between(0.0, most));
+    let length = |key: &str| Ok(read(key, OFFSET_MM_MAX)?.unwrap_or(0.0) / 1e3);
+    let angle = |key: &str| Ok(read(key, LEAN_DEG_MAX)?.unwrap_or(0.0).to_radians());
+    let alignment = Alignment {
+        u_offset_m: [length("u_offset_x_mm")?, length("u_offset_y_mm")?, length("u_offset_z_mm")?],
+        u_arm_axis_rad: angle("u_arm_axis_deg")?,
+        u_beam_rad: angle("u_beam_deg")?,
+        u_tilt_rad: angle("u_tilt_deg")?,
+    };
+    table.finish()?;
+    Ok(alignment)
+}
+
 /// The keys of `[detector]`.
 ///
 /// `quantity` radiance (default), luminance or relative · `distance_mm` from the sample to the
 /// entrance pupil · `pupil_diameter_mm` · `spot_diameter_mm` on a sample facing it · a
 /// `u_..._mm` for each of the three · `responsivity_a_per_w` (for luminance
-/// `responsivity_a_per_lm`, for relative none) and `u_responsivity_relative` · `read_noise_a` of
-/// one ADC reading · `[[detector.gain]]` with `name`, `full_scale_a`, `u_relative` ·
+/// `responsivity_a_per_lm`, for relative none) and `u_responsivity_relative` ·
+/// `spectral_mismatch` (default 1), by which radiances are multiplied for a source of another
+/// spectrum than the calibration's, and `u_spectral_mismatch_relative` · `read_noise_a` of one ADC reading · `[[detector.gain]]` with `name`, `full_scale_a`, `u_relative` ·
 /// `[detector.adc]` with `bits` (sign included) and `rate_hz`.
 fn read_detector(table: Table<'_>) -> Result<Detector, Problem> {
     let quantity = read_quantity(&table)?;
     let length = |key: &str| table.required_number(key, Bounds::POSITIVE).map(|mm| mm / 1e3);
     let u_length = |key: &str| table.required_number(key, Bounds::NON_NEGATIVE).map(|mm| mm / 1e3);
     let (responsivity, u_responsivity_relative) = read_responsivity(&table, quantity)?;
+    let (spectral_mismatch, u_spectral_mismatch_relative) = read_mismatch(&table, quantity)?;
     let detector = Detector {
         quantity,
         distance_m: length("distance_mm")?,
@@ -213,6 +243,8 @@ fn read_detector(table: Table<'_>) -> Result<Detector, Problem> {
         u_spot_radius_m: u_length("u_spot_diameter_mm")? / 2.0,
         responsivity,
         u_responsivity_relative,
+        spectral_mismatch,
+        u_spectral_mismatch_relative,
         read_noise_a: table.required_number("read_noise_a", Bounds::NON_NEGATIVE)?,
         gains: read_gains(&table)?,
         adc: read_adc(table.required_table("adc")?)?,
@@ -253,6 +285,28 @@ fn read_responsivity(table: &Table<'_>, quantity: Quantity) -> Result<(f64, f64)
     let responsivity = table.required_number(key, Bounds::POSITIVE)?;
     let u_relative = table.required_number("u_responsivity_relative", RELATIVE)?;
     Ok((responsivity, u_relative))
+}
+
+/// A factor always comes with its uncertainty; an uncertainty alone says that nothing is corrected.
+fn read_mismatch(table: &Table<'_>, quantity: Quantity) -> Result<(f64, f64), Problem> {
+    const KEYS: [&str; 2] = ["spectral_mismatch", "u_spectral_mismatch_relative"];
+    if quantity == Quantity::Relative
+        && let Some(key) = KEYS.into_iter().find(|key| table.has(key))
+    {
+        return Err(table.problem(
+            key,
+            "a spectral mismatch of a detector without a calibration",
+            "none where quantity = \"relative\"",
+            "remove it, or state the detector's quantity and responsivity",
+        ));
+    }
+    let factor = table.number(KEYS[0], MISMATCH)?;
+    let u_relative = if factor.is_some() {
+        table.required_number(KEYS[1], RELATIVE)?
+    } else {
+        table.number(KEYS[1], RELATIVE)?.unwrap_or(0.0)
+    };
+    Ok((factor.unwrap_or(1.0), u_relative))
 }
 
 fn read_gains(table: &Table<'_>) -> Result<Vec<Gain>, Problem> {

@@ -58,6 +58,20 @@ fn every_mistake_is_named_at_its_line() {
         ("[axes.y]", "[axes.z]", "axes.y"),
         ("quantity = \"radiance\"", "quantity = \"luminance\"", "detector.responsivity_a_per_lm"),
         ("quantity = \"radiance\"", "quantity = \"relative\"", "detector.responsivity_a_per_w"),
+        (
+            "read_noise_a",
+            "spectral_mismatch = 1.02\nread_noise_a",
+            "detector.u_spectral_mismatch_relative",
+        ),
+        ("read_noise_a", "spectral_mismatch = 0.02\nread_noise_a", "detector.spectral_mismatch"),
+        (
+            "read_noise_a",
+            "u_spectral_mismatch_relative = 2\nread_noise_a",
+            "detector.u_spectral_mismatch_relative",
+        ),
+        ("[link]", "[alignment]\nu_offset_x_mm = -0.1\n[link]", "alignment.u_offset_x_mm"),
+        ("[link]", "[alignment]\nu_beam_deg = 11\n[link]", "alignment.u_beam_deg"),
+        ("[link]", "[alignment]\nu_offset_mm = 0.1\n[link]", "alignment.u_offset_mm"),
         ("distance_mm = 300", "distance_mm = 0", "detector.distance_mm"),
         ("distance_mm = 300", "distance_mm = 1e200", "detector.distance_mm"),
         ("pupil_diameter_mm = 12.5", "pupil_diameter_mm = -12.5", "detector.pupil_diameter_mm"),
@@ -90,6 +104,19 @@ fn a_serial_link_waits_for_a_board_that_resets() {
 }
 
 #[test]
+fn alignment_is_known_exactly_unless_it_is_stated_otherwise() {
+    assert_eq!(Rig::built_in().unwrap().alignment, Alignment::default());
+    let rig =
+        changed("[link]", "[alignment]\nu_offset_z_mm = 0.2\nu_tilt_deg = 0.1\n\n[link]").unwrap();
+    let expected = Alignment {
+        u_offset_m: [0.0, 0.0, 0.2e-3],
+        u_tilt_rad: 0.1_f64.to_radians(),
+        ..Alignment::default()
+    };
+    assert_eq!(rig.alignment, expected);
+}
+
+#[test]
 fn quantities_other_than_radiance_carry_other_names() {
     let text = BUILT_IN
         .replace("\"radiance\"", "\"luminance\"")
@@ -101,6 +128,10 @@ fn quantities_other_than_radiance_carry_other_names() {
         .replace("\"radiance\"", "\"relative\"")
         .replace("responsivity_a_per_w = 0.2", "")
         .replace("u_responsivity_relative = 0.005", "");
+    let mismatched =
+        text.replace("read_noise_a", "u_spectral_mismatch_relative = 0.01\nread_noise_a");
+    let problem = read(&mismatched).unwrap_err();
+    assert!(problem.to_string().contains("without a calibration"), "{problem}");
     let detector = read(&text).unwrap().detector;
     assert_eq!(detector.quantity.radiance_column(), "radiance_relative");
     assert_eq!(detector.responsivity.to_bits(), 1.0_f64.to_bits());

@@ -4,6 +4,7 @@
 //! This room reads no clock, does no I/O but for the text of rig.toml, and does not know whether
 //! hardware exists.
 
+mod alignment;
 mod axis;
 pub mod calibration;
 mod detector;
@@ -16,6 +17,7 @@ mod motion;
 mod pose;
 mod reading;
 
+pub use alignment::{Alignment, Misalignment};
 pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
 pub use kinematics::{Route, forward, solutions};
@@ -33,6 +35,8 @@ pub struct Rig {
     pub name: String,
     /// Its axes, in the order of [`AXES`].
     pub axes: [Axis; 4],
+    /// How well it is known that its axes stand to each other as drawn.
+    pub alignment: Alignment,
     /// Its detector.
     pub detector: Detector,
     /// How it is reached.

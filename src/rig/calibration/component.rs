@@ -2,7 +2,7 @@
 //! makes it smaller.
 
 use super::{Dark, Sample};
-use crate::rig::{AXES, AxisName, AxisPositions, Pose, Rig, forward};
+use crate::rig::{AXES, AxisName, AxisPositions, Misalignment, Pose, Rig, forward};
 
 /// A source of uncertainty that samples share. Components are independent of each other.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,7 +10,7 @@ pub struct Component {
     /// What it is, as a budget's row names it.
     pub name: String,
     /// Its standard uncertainty: relative for [`Effect::Scale`], in the unit of radiance for
-    /// [`Effect::Offset`], radians or metres for [`Effect::Axis`].
+    /// [`Effect::Offset`], radians or metres for what moves rays.
     pub u: f64,
     /// What it does, and to which samples.
     pub effect: Effect,
@@ -42,13 +42,18 @@ pub enum Effect {
         /// Which axis.
         axis: AxisName,
     },
+    /// The rig stands askew by u, in all sessions.
+    Alignment {
+        /// In which way.
+        of: Misalignment,
+    },
 }
 
 impl Component {
     /// Whether it concerns the sample.
     pub fn concerns(&self, sample: &Sample) -> bool {
         match self.effect {
-            Effect::Readback { .. } => true,
+            Effect::Readback { .. } | Effect::Alignment { .. } => true,
             Effect::Scale { gain } => gain.is_none_or(|gain| gain == sample.gain),
             Effect::Offset { gain } => gain == sample.gain,
             Effect::Axis { session, .. } => session.is_none_or(|session| session == sample.session),
@@ -56,7 +61,7 @@ impl Component {
     }
 
     /// By how much the sample's value is too large if the component is off by one u, at the
-    /// sample's level; 0 for axes.
+    /// sample's level; 0 for what moves rays.
     pub fn excess(&self, sample: &Sample, level: f64) -> f64 {
         match self.effect {
             Effect::Scale { .. } if self.concerns(sample) => self.u * level,
@@ -75,6 +80,7 @@ impl Component {
                 }
                 forward(AxisPositions(positions))
             }
+            Effect::Alignment { of } => of.ray_seen(sample.positions, times * self.u),
             _ => sample.pose,
         }
     }
@@ -86,6 +92,7 @@ pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component
     let everywhere = Effect::Scale { gain: None };
     let mut all = vec![
         component("responsivity", detector.u_responsivity_relative, everywhere),
+        component("spectral mismatch", detector.u_spectral_mismatch_relative, everywhere),
         component("throughput", detector.u_throughput_relative(), everywhere),
     ];
     for dark in darks.iter().filter(|dark| samples.iter().any(|s| s.gain == dark.gain)) {
@@ -109,6 +116,8 @@ pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component
         let readback = Effect::Readback { axis: axis.name };
         all.push(component(&format!("{name} readback"), axis.u_readback, readback));
     }
+    let parts = rig.alignment.parts().into_iter();
+    all.extend(parts.map(|(of, u)| component(of.name(), u, Effect::Alignment { of })));
     all.retain(|component| component.u > 0.0);
     all
 }

@@ -105,7 +105,7 @@ fn common(component: &Component, used: &Arc<[Sample]>) -> Common {
         Effect::Scale { .. } | Effect::Offset { .. } => {
             Shift::Value(Box::new(move |i, level| own.excess(&samples[i], level)))
         }
-        Effect::Axis { .. } | Effect::Readback { .. } => {
+        Effect::Axis { .. } | Effect::Readback { .. } | Effect::Alignment { .. } => {
             Shift::Ray(Box::new(move |i, _| ray(own.ray_seen(&samples[i], 1.0))))
         }
     };

@@ -4,6 +4,7 @@
 use fit::{Contribution, Ray, Rules, Wish};
 
 use super::*;
+use crate::rig::Alignment;
 
 const DARK_A: f64 = 2e-11;
 
@@ -227,6 +228,79 @@ fn a_step_between_ranges_is_found_where_both_saw_the_same_field() {
     }
     let rms = libm::sqrt(squares / count);
     assert!((0.75..1.3).contains(&rms), "{rms}");
+}
+
+/// Where a rig that stands askew looks, every rotation exact.
+fn askew(positions: AxisPositions, [x, y, z, arm_axis, beam, tilt, towards]: [f64; 7]) -> Ray {
+    use glam::{DMat3, DVec3};
+    let AxisPositions([theta, phi, stage_x, stage_y]) = positions;
+    let arm = DMat3::from_rotation_x(arm_axis)
+        * DMat3::from_rotation_y(theta)
+        * DMat3::from_rotation_x(beam);
+    let lean = DMat3::from_rotation_z(towards);
+    let top = lean * DMat3::from_rotation_y(tilt) * lean.transpose();
+    let to_sample = (DMat3::from_rotation_z(-phi) * top).transpose();
+    let (through, along) = (to_sample * DVec3::new(x, y, z), to_sample * arm * DVec3::Z);
+    let place = through - along * (through.z / along.z);
+    let (theta_rad, phi_rad) = direction::angles(along);
+    Ray { x_m: stage_x + place.x, y_m: stage_y + place.y, theta_rad, phi_rad }
+}
+
+#[test]
+fn a_rig_that_stands_askew_is_off_by_what_its_alignment_s_u_says() {
+    let mut rig = rig();
+    rig.alignment = Alignment {
+        u_offset_m: [2e-4, 3e-4, 2.5e-4],
+        u_arm_axis_rad: 0.004,
+        u_beam_rad: 0.002,
+        u_tilt_rad: 0.003,
+    };
+    // What the basis follows, with a slope along everything.
+    let field = |ray: &Ray| {
+        let d = direction::unit(ray.theta_rad, ray.phi_rad);
+        (50.0 + 12.0 * d.x - 9.0 * d.y + 10.0 * d.x * d.x + 8.0 * d.x * d.y)
+            * (1.0 + 15.0 * ray.x_m - 10.0 * ray.y_m)
+    };
+    let wish = Wish { position_degree: Some(1), ..WISH };
+    let region = fit::Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.3);
+    let names = ["axis offset", "arm axis tilt", "beam tilt", "table tilt"];
+    let (mut squares, mut count, mut exitance) = (0.0, 0.0, 0.0);
+    let seeds = 150;
+    for seed in 0..seeds {
+        let mut die = Die(seed * 13 + 7);
+        let Alignment { u_offset_m: [x, y, z], u_arm_axis_rad, u_beam_rad, u_tilt_rad } =
+            rig.alignment;
+        let drawn = [x, y, z, u_arm_axis_rad, u_beam_rad, u_tilt_rad].map(|u| u * die.normal());
+        let [x, y, z, arm_axis, beam, tilt] = drawn;
+        let drawn = [x, y, z, arm_axis, beam, tilt, die.uniform() * std::f64::consts::TAU];
+        let mut all = vec![at_rest(0, ReadingKind::Dark, Latched::ZERO, 0)];
+        for index in 0..240_u32 {
+            let i = i32::try_from(index).unwrap();
+            let place =
+                [[-8000, -7000], [8000, -6000], [-7500, 8000], [7000, 7500]][index as usize % 4];
+            let at =
+                Latched([-70_000 + i * 583, i * 37_000 % 340_000 - 170_000, place[0], place[1]]);
+            let kind = ReadingKind::Target { index, repeat: 0 };
+            let mut reading = at_rest(index + 1, kind, at, 0);
+            let seen = field(&askew(rig.measured(&reading).0, drawn));
+            reading.mean = seen * rig.detector.a_per_radiance() / rig.detector.lsb_a(0);
+            all.push(reading);
+        }
+        let calibrated = calibrate(&rig, &all).unwrap();
+        let fit = calibrated.fit(&region, &wish, None).unwrap().fit;
+        for k in 0..24_u32 {
+            let t = f64::from(k);
+            let (theta_rad, phi_rad) = (0.05 + 0.05 * t, 2.4 * t);
+            let ray = Ray { x_m: 0.004 - 3e-4 * t, y_m: 2e-4 * t - 0.003, theta_rad, phi_rad };
+            let u = u_by(&fit.radiance_contributions(&ray), &names);
+            squares += ((fit.value(&ray) - field(&ray)) / u).powi(2);
+            count += 1.0;
+        }
+        exitance += u_by(&fit.contributions(), &names) / fit.exitance().value / f64::from(150);
+    }
+    let rms = libm::sqrt(squares / count);
+    assert!((0.85..1.15).contains(&rms), "{rms}");
+    assert!(exitance > 1e-4, "{exitance}");
 }
 
 #[test]

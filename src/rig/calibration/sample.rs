@@ -225,10 +225,7 @@ pub(super) fn from_reading(rig: &Rig, darks: &[Dark], reading: &Reading) -> Opti
         u_common: 0.0,
         u: 0.0,
         noise,
-        u_scale_relative: libm::hypot(
-            libm::hypot(rig.detector.u_responsivity_relative, rig.detector.u_throughput_relative()),
-            gain.u_relative,
-        ),
+        u_scale_relative: libm::hypot(rig.detector.u_scale_relative(), gain.u_relative),
         u_dark: darks
             .iter()
             .find(|dark| dark.gain == reading.gain)

@@ -290,6 +290,26 @@ fn a_gain_concerns_its_own_samples_alone_and_a_homing_its_session() {
 }
 
 #[test]
+fn a_spectral_mismatch_multiplies_the_values_and_all_share_its_u() {
+    let rig = rig();
+    let mut other = rig.clone();
+    other.detector.spectral_mismatch = 1.04;
+    other.detector.u_spectral_mismatch_relative = 0.012;
+    let readings = [dark(&rig, 0, DARK_A), target(&rig, 1, 40.0)];
+    let of = |rig: &Rig| calibrate(rig, &readings).unwrap();
+    let (plain, corrected) = (of(&rig), of(&other));
+    assert_close(corrected.samples[0].value, 1.04 * plain.samples[0].value);
+    // The noise is multiplied along.
+    assert_close(corrected.samples[0].u_independent, 1.04 * plain.samples[0].u_independent);
+    let common = |of: &Calibrated| of.samples[0].u_common / of.samples[0].value;
+    assert_close(common(&corrected), libm::hypot(common(&plain), 0.012));
+    let component = corrected.components.iter().find(|c| c.name == "spectral mismatch").unwrap();
+    assert_eq!(component.effect, Effect::Scale { gain: None });
+    assert_close(component.u, 0.012);
+    assert!(!plain.components.iter().any(|c| c.name == "spectral mismatch"));
+}
+
+#[test]
 fn an_axis_zero_moves_the_ray_by_what_the_axis_does() {
     let rig = rig();
     let other_side = Latched([-10_000, 20_000, 0, 0]);
