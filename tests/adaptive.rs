@@ -91,6 +91,22 @@ fn a_finer_target_takes_more_sweeps_and_gets_nearer() {
 }
 
 #[test]
+fn a_fit_that_lacks_meridians_gets_whole_ones_until_the_checks_agree() {
+    // Plain least squares of degree 12 wants 25 azimuths, whatever there is to see.
+    let bench = asked(bench(), "0.03").with("plan.toml", "penalty_power = 2\n", "");
+    let (said, summary) = run(&bench);
+    assert_eq!(said.code, Some(0), "{said}");
+    let rounds = rounds(&summary);
+    let (first, last) = (&rounds[0], rounds.last().unwrap());
+    // After the first round the interpolation is content, and the fit is not.
+    assert!(number(&first["between_relative"]) <= 0.03 && first["verdict"].is_null(), "{said}");
+    let arc = |round: &Value| number(&round["gaps"]["arc_deg"]);
+    assert!(arc(last) < 0.8 * arc(first), "{said}");
+    let upper = number(&last["checked_upper_relative"]);
+    assert!(truly(&summary) <= libm::hypot(upper, 0.006), "{said}");
+}
+
+#[test]
 fn a_spike_narrower_than_declared_is_not_missed_in_silence() {
     let spike = |phi_deg: f64| {
         let lobe = format!(

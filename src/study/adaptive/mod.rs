@@ -271,7 +271,8 @@ impl State<'_> {
             said.push(format!("exitance to {}, asked {}", percent(u), percent(asked)));
         }
         let Account { round, sweeps, .. } = account;
-        let why = format!("{} after {sweeps} sweeps in {round} rounds", said.join(", "));
+        let s = if *round == 1 { "" } else { "s" };
+        let why = format!("{} after {sweeps} sweeps in {round} round{s}", said.join(", "));
         Some(Verdict { is_met: true, why, largest: None })
     }
 
