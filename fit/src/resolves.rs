@@ -124,8 +124,10 @@ fn bends(angular: Angular, region: &Region) -> (f64, f64) {
         }
         // A quarter turn of θ is half a turn of theirs.
         Angular::Hemispherical { degree } => (period(degree) / 2.0, period(degree)),
-        Angular::Splines { theta_spans, phi_spans } => {
-            (PI / theta_spans.max(1) as f64, 2.0 * TAU / phi_spans.max(1) as f64)
+        Angular::Splines { theta_spans, phi_spans, fine } => {
+            let halvings = if fine.is_none() { 0 } else { fine.halvings.min(52) };
+            let narrowest = theta_spans.max(1) as f64 * (1_u64 << halvings) as f64;
+            (PI / narrowest, 2.0 * TAU / phi_spans.max(1) as f64)
         }
     }
 }

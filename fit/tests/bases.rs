@@ -4,7 +4,9 @@
 #[allow(dead_code, reason = "tests share them")]
 mod scenes;
 
-use fit::{Angular, BasisSpec, Fit, Noise, Penalised, Penalty, Position, Ray, Region, Sample};
+use fit::{
+    Angular, BasisSpec, Fine, Fit, Noise, Penalised, Penalty, Position, Ray, Region, Sample,
+};
 use radiometry::quadrature::cone;
 use scenes::{Die, REGION, exact, spread_rays};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -14,7 +16,7 @@ const ANGULAR: [Angular; 5] = [
     Angular::Zernike { degree: 5, cosine_columns: 3 },
     Angular::Hemispherical { degree: 3 },
     Angular::EvenHarmonics { degree: 5 },
-    Angular::Splines { theta_spans: 5, phi_spans: 9 },
+    Angular::Splines { theta_spans: 5, phi_spans: 9, fine: Fine { from: 1, to: 3, halvings: 2 } },
 ];
 const POSITION: [Position; 3] = [
     Position::Legendre { degree: 0 },
@@ -131,7 +133,7 @@ fn a_field_of_the_basis_is_found_again() {
 #[test]
 fn splines_are_smooth_across_the_pole_and_round_the_seam() {
     let basis = BasisSpec {
-        angular: Angular::Splines { theta_spans: 6, phi_spans: 16 },
+        angular: Angular::Splines { theta_spans: 6, phi_spans: 16, fine: Fine::NONE },
         position: Position::Legendre { degree: 0 },
     };
     let fit = drawn(basis, 5);
@@ -167,7 +169,7 @@ fn a_penalty_fills_gaps_with_uncertainty_and_few_readings_are_enough() {
     for angular in [
         Angular::Zernike { degree: 14, cosine_columns: 2 },
         Angular::Hemispherical { degree: 10 },
-        Angular::Splines { theta_spans: 10, phi_spans: 12 },
+        Angular::Splines { theta_spans: 10, phi_spans: 12, fine: Fine::NONE },
     ] {
         let basis = BasisSpec { angular, position: Position::Legendre { degree: 0 } };
         assert!(basis.len() > samples.len());

@@ -5,7 +5,8 @@
 mod scenes;
 
 use fit::{
-    AngularKind, BasisSpec, Choice, Fit, Limit, Noise, Penalty, Ray, Region, Resolves, Sample, Wish,
+    Angular, AngularKind, BasisSpec, Choice, Fit, Limit, Noise, Penalty, Ray, Region, Resolves,
+    Sample, Wish,
 };
 use scenes::{Die, raster_rays, spread_rays};
 use std::f64::consts::FRAC_PI_2;
@@ -222,4 +223,28 @@ fn what_can_be_resolved_is_what_basis_plan_and_beam_allow() {
     assert_eq!(coarse.theta_rad.limit, Limit::Basis);
     assert!((coarse.theta_rad.width.to_degrees() - 45.0).abs() < 1e-9);
     assert_eq!((coarse.x_m, coarse.y_m), (None, None));
+}
+
+#[test]
+fn a_lobe_narrower_than_even_splines_follow_gets_finer_ones() {
+    let rays = raster_rays(&CONE, 81, 12, 1);
+    let field: Field = |ray| libm::pow(libm::cos(ray.theta_rad), 400.0);
+    let u = 0.002;
+    let samples = noisy(&rays, field, u, &mut Die::new(3));
+    let wish = Wish { kind: Some(AngularKind::Splines), ..Wish::default() };
+    let (model, _) = fit::choose(&samples, &CONE, &wish, None).unwrap();
+    let Angular::Splines { fine, .. } = model.basis.angular else { panic!("{model:?}") };
+    assert!(fine.halvings > 0 && fine.from == 0, "{fine:?}");
+    let (rms, ..) = errors(&fit::fit(&samples, &CONE, model, &[]).unwrap(), field, &CONE);
+    // Even spans leave four times as much.
+    assert!(rms < 1.2 * u, "{rms}");
+}
+
+#[test]
+fn a_field_even_in_x_is_not_taken_for_alike_everywhere() {
+    let rays: Vec<Ray> = raster_rays(&CONE, 7, 6, 3);
+    let field: Field = |ray| libm::cos(ray.theta_rad) * (1.0 - 5e3 * ray.x_m * ray.x_m);
+    let samples = noisy(&rays, field, 0.002, &mut Die::new(6));
+    let (fit, _) = fitted(&samples, &CONE);
+    assert_eq!(fit.basis().position.degree(), Some(2));
 }

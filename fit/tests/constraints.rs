@@ -174,7 +174,7 @@ fn every_kind_of_basis_is_symmetric_or_says_that_it_cannot_be() {
         let at = |phi_rad| round.value(&Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.7, phi_rad });
         assert!((at(0.1) - at(2.2)).abs() < 1e-7);
     }
-    let splines = of(fit::Angular::Splines { theta_spans: 6, phi_spans: 8 });
+    let splines = of(fit::Angular::Splines { theta_spans: 6, phi_spans: 8, fine: fit::Fine::NONE });
     let refused = splines.symmetric(Symmetry::Rotational).unwrap_err();
     assert!(matches!(refused, SymmetryError::Basis { .. }), "{refused}");
     // Mirrored at φ = 0, knots fall on knots.

@@ -220,8 +220,14 @@ fn basis_in_words(basis: BasisSpec) -> String {
         Angular::Spherical { degree } => format!("spherical harmonics of degree {degree}"),
         Angular::SecondPlane { degree } => format!("Legendre in s and t of degree {degree}"),
         Angular::EvenHarmonics { degree } => format!("even harmonics of degree {degree}"),
-        Angular::Splines { theta_spans, phi_spans } => {
-            format!("splines of {theta_spans} spans in θ, {phi_spans} round the horizon")
+        Angular::Splines { theta_spans, phi_spans, fine } => {
+            let spans =
+                format!("splines of {theta_spans} spans in θ, {phi_spans} round the horizon");
+            let parts = 1_u64 << fine.halvings.min(52);
+            let deg = |span: usize| 90.0 * span as f64 / theta_spans as f64;
+            let (from, to) = (deg(fine.from), deg(fine.to));
+            let finer = format!("{spans}, {parts} times as fine from {from:.0}° to {to:.0}°");
+            if fine.is_none() { spans } else { finer }
         }
     };
     match basis.position {

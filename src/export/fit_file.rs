@@ -189,13 +189,15 @@ fn budget(rows: &[Contribution]) -> Value {
 
 /// Which functions. What a kind does not have is null.
 fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
-    let (cosine_columns, spans) = match spec.angular {
-        Angular::Zernike { cosine_columns, .. } => (Some(cosine_columns), None),
+    let (cosine_columns, spans, fine) = match spec.angular {
+        Angular::Zernike { cosine_columns, .. } => (Some(cosine_columns), None, None),
         Angular::Hemispherical { .. }
         | Angular::EvenHarmonics { .. }
         | Angular::Spherical { .. }
-        | Angular::SecondPlane { .. } => (None, None),
-        Angular::Splines { theta_spans, phi_spans } => (None, Some((theta_spans, phi_spans))),
+        | Angular::SecondPlane { .. } => (None, None, None),
+        Angular::Splines { theta_spans, phi_spans, fine } => {
+            (None, Some((theta_spans, phi_spans)), (!fine.is_none()).then_some(fine))
+        }
     };
     let position_spans = match spec.position {
         Position::Legendre { .. } => None,
@@ -217,6 +219,7 @@ fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
         "cosine_columns": cosine_columns,
         "theta_spans": spans.map(|(theta, _)| theta),
         "phi_spans": spans.map(|(_, phi)| phi),
+        "fine_spans": fine.map(|fine| json!([fine.from, fine.to, fine.halvings])),
         "position_degree": spec.position.degree(),
         "position_spans": position_spans,
     });

@@ -10,7 +10,9 @@ use std::io::{self, Write};
 
 use crc::{CRC_64_XZ, Crc};
 use fit::partial::{Partial, Parts, Sums, Weighting};
-use fit::{Angular, BasisSpec, Chart, Face, FitError, Optics, Outline, Penalty, Position, Region};
+use fit::{
+    Angular, BasisSpec, Chart, Face, Fine, FitError, Optics, Outline, Penalty, Position, Region,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -119,12 +121,29 @@ struct Header {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum AngularHeader {
-    Zernike { degree: usize, cosine_columns: usize },
-    Hemispherical { degree: usize },
-    EvenHarmonics { degree: usize },
-    Splines { theta_spans: usize, phi_spans: usize },
-    Spherical { degree: usize },
-    SecondPlane { degree: usize },
+    Zernike {
+        degree: usize,
+        cosine_columns: usize,
+    },
+    Hemispherical {
+        degree: usize,
+    },
+    EvenHarmonics {
+        degree: usize,
+    },
+    Splines {
+        theta_spans: usize,
+        phi_spans: usize,
+        /// First, one after the last, and how often each is halved.
+        #[serde(default)]
+        fine_spans: [usize; 3],
+    },
+    Spherical {
+        degree: usize,
+    },
+    SecondPlane {
+        degree: usize,
+    },
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -346,8 +365,9 @@ impl BasisHeader {
             }
             Angular::Hemispherical { degree } => AngularHeader::Hemispherical { degree },
             Angular::EvenHarmonics { degree } => AngularHeader::EvenHarmonics { degree },
-            Angular::Splines { theta_spans, phi_spans } => {
-                AngularHeader::Splines { theta_spans, phi_spans }
+            Angular::Splines { theta_spans, phi_spans, fine } => {
+                let fine_spans = [fine.from, fine.to, fine.halvings];
+                AngularHeader::Splines { theta_spans, phi_spans, fine_spans }
             }
             Angular::Spherical { degree } => AngularHeader::Spherical { degree },
             Angular::SecondPlane { degree } => AngularHeader::SecondPlane { degree },
@@ -366,8 +386,9 @@ impl BasisHeader {
             }
             AngularHeader::Hemispherical { degree } => Angular::Hemispherical { degree },
             AngularHeader::EvenHarmonics { degree } => Angular::EvenHarmonics { degree },
-            AngularHeader::Splines { theta_spans, phi_spans } => {
-                Angular::Splines { theta_spans, phi_spans }
+            AngularHeader::Splines { theta_spans, phi_spans, fine_spans } => {
+                let [from, to, halvings] = fine_spans;
+                Angular::Splines { theta_spans, phi_spans, fine: Fine { from, to, halvings } }
             }
             AngularHeader::Spherical { degree } => Angular::Spherical { degree },
             AngularHeader::SecondPlane { degree } => Angular::SecondPlane { degree },

@@ -179,7 +179,7 @@ fn nodes_of_fit(fit: &Fit) -> Vec<(Ray, f64)> {
         | Angular::EvenHarmonics { degree }
         | Angular::Spherical { degree }
         | Angular::SecondPlane { degree } => degree,
-        Angular::Splines { theta_spans, phi_spans } => theta_spans.max(phi_spans),
+        Angular::Splines { theta_spans, phi_spans, .. } => theta_spans.max(phi_spans),
     };
     let places = match fit.basis().position {
         Position::Legendre { degree } => degree + 1,

@@ -59,8 +59,8 @@ impl Directions {
                     .flat_map(|l| (0..=2 * l).step_by(2).map(move |place| l * l + place))
                     .collect(),
             },
-            Angular::Splines { theta_spans, phi_spans } => {
-                Self::Splines(PolarSplines::new(theta_spans, phi_spans).map_err(refused)?)
+            Angular::Splines { theta_spans, phi_spans, fine } => {
+                Self::Splines(PolarSplines::new(theta_spans, phi_spans, fine).map_err(refused)?)
             }
             Angular::Spherical { degree } => {
                 Self::Spherical(SphericalHarmonics::new(degree).map_err(refused)?)

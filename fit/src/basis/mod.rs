@@ -19,7 +19,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub(crate) use angular::Directions;
 pub(crate) use place::Places;
 pub(crate) use plane::SecondPlane;
-pub use spec::{Angular, BasisSpec, Position};
+pub use spec::{Angular, BasisSpec, Fine, Position};
 pub(crate) use splines::{Derivative, PolarSplines};
 
 /// The functions of a spec over a region, ready to be evaluated.

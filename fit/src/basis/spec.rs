@@ -1,6 +1,6 @@
 //! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
 
-use super::splines::{Band, bands};
+use super::splines::{Band, bands, breaks};
 use crate::{Chart, FitError};
 
 /// Which functions a field is a sum of: every function of direction times every one of position.
@@ -44,6 +44,8 @@ pub enum Angular {
         theta_spans: usize,
         /// Equal spans of φ round the horizon; round the cone θ about sin θ times as many.
         phi_spans: usize,
+        /// Where spans of θ are finer.
+        fine: Fine,
     },
     /// Spherical harmonics up to degree l, (l + 1)² of them: directions all round, of the
     /// perpendicular and the environment chart.
@@ -57,6 +59,27 @@ pub enum Angular {
         /// The total degree n.
         degree: usize,
     },
+}
+
+/// A stretch of θ whose spans are halved, for a lobe or an edge that is narrow in θ alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fine {
+    /// The first span of θ that is halved, from 0 at the normal.
+    pub from: usize,
+    /// The one after the last.
+    pub to: usize,
+    /// How often.
+    pub halvings: usize,
+}
+
+impl Fine {
+    /// All spans alike.
+    pub const NONE: Self = Self { from: 0, to: 0, halvings: 0 };
+
+    /// Whether all spans are alike.
+    pub fn is_none(&self) -> bool {
+        self.halvings == 0 || self.to <= self.from
+    }
 }
 
 /// Functions of the place on the sample.
@@ -119,13 +142,14 @@ impl Angular {
             }
             Self::EvenHarmonics { degree } | Self::SecondPlane { degree } => triangular(degree),
             // More spans than this have too many functions whatever they are.
-            Self::Splines { theta_spans, phi_spans }
-                if theta_spans.max(phi_spans) > COEFFICIENTS_MAX =>
+            Self::Splines { theta_spans, phi_spans, fine }
+                if theta_spans.max(phi_spans) > COEFFICIENTS_MAX
+                    || fine.halvings > HALVINGS_MAX =>
             {
                 usize::MAX
             }
-            Self::Splines { theta_spans, phi_spans } => {
-                bands(theta_spans, phi_spans).map(Band::len).sum()
+            Self::Splines { theta_spans, phi_spans, fine } => {
+                bands(&breaks(theta_spans, fine), phi_spans).map(Band::len).sum()
             }
         }
     }
@@ -190,3 +214,5 @@ fn triangular(degree: usize) -> usize {
 
 /// Beyond it the triangle alone takes 134 MB, and the factorisation minutes.
 const COEFFICIENTS_MAX: usize = 4096;
+/// Spans beyond it are narrower than any encoder tells.
+const HALVINGS_MAX: usize = 8;

@@ -8,6 +8,7 @@
 //! θ³, there are splines in φ ("polar splines", after Toshniwal, Speleers, Hiemstra and Hughes
 //! 2017). The sum of those of order 0 and of all others is 1.
 
+use super::Fine;
 use glam::DVec3;
 use radiometry::DomainError;
 use radiometry::basis::BSpline;
@@ -33,28 +34,36 @@ impl Band {
     }
 }
 
+/// Where the spans of θ begin and end.
+pub(crate) fn breaks(theta_spans: usize, fine: Fine) -> Vec<f64> {
+    let spans = theta_spans.max(1);
+    let parts = |i: usize| if (fine.from..fine.to).contains(&i) { 1 << fine.halvings } else { 1 };
+    let within = (0..spans).flat_map(|i| {
+        let parts = parts(i);
+        (0..parts).map(move |k| i as f64 + f64::from(k) / f64::from(parts))
+    });
+    within.chain([spans as f64]).map(|at| FRAC_PI_2 * at / spans as f64).collect()
+}
+
 /// The bands of θ, from the pole; the first one's function of θ is the sum of the first two splines,
 /// the second's the second.
-pub(crate) fn bands(theta_spans: usize, phi_spans: usize) -> impl Iterator<Item = Band> {
-    let theta_spans = theta_spans.max(1);
-    (0..theta_spans + DEGREE).map(move |i| match i {
+pub(crate) fn bands(breaks: &[f64], phi_spans: usize) -> impl Iterator<Item = Band> {
+    (0..breaks.len() - 1 + DEGREE).map(move |i| match i {
         0 => Band::Orders { first: 0, last: 0 },
         1 => Band::Orders { first: 1, last: 1 },
         2 => Band::Orders { first: 0, last: 2 },
         _ => {
-            // Greville's abscissa: where the spline is centred.
-            let place = greville(i, theta_spans);
-            let round = libm::round(phi_spans as f64 * libm::sin(place));
+            let round = libm::round(phi_spans as f64 * libm::sin(greville(i, breaks)));
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small, positive
             Band::Local { count: (round as usize).max(PHI_SPANS_MIN) }
         }
     })
 }
 
-/// Where spline `i` of `spans` equal spans of [0, π/2] is centred.
-fn greville(i: usize, spans: usize) -> f64 {
-    let knot = |k: usize| k.saturating_sub(DEGREE).min(spans) as f64 / spans as f64;
-    FRAC_PI_2 * (1..=DEGREE).map(|k| knot(i + k)).sum::<f64>() / DEGREE as f64
+/// Where spline `i` over these breaks is centred: Greville's abscissa.
+fn greville(i: usize, breaks: &[f64]) -> f64 {
+    let knot = |k: usize| breaks[k.saturating_sub(DEGREE).min(breaks.len() - 1)];
+    (1..=DEGREE).map(|k| knot(i + k)).sum::<f64>() / DEGREE as f64
 }
 
 /// All functions, ready to be evaluated.
@@ -63,6 +72,7 @@ pub(crate) struct PolarSplines {
     theta: BSpline,
     bands: Vec<Placed>,
     len: usize,
+    breaks: Vec<f64>,
     phi_spans: usize,
 }
 
@@ -83,12 +93,15 @@ pub(crate) struct Derivative {
 }
 
 impl PolarSplines {
-    pub(crate) fn new(theta_spans: usize, phi_spans: usize) -> Result<Self, DomainError> {
-        let spans = theta_spans.max(1);
-        let breaks: Vec<f64> = (0..=spans).map(|i| FRAC_PI_2 * i as f64 / spans as f64).collect();
-        let mut placed = Vec::with_capacity(spans + DEGREE);
+    pub(crate) fn new(
+        theta_spans: usize,
+        phi_spans: usize,
+        fine: Fine,
+    ) -> Result<Self, DomainError> {
+        let breaks = breaks(theta_spans, fine);
+        let mut placed = Vec::with_capacity(breaks.len() + DEGREE);
         let mut at = 0;
-        for band in bands(theta_spans, phi_spans) {
+        for band in bands(&breaks, phi_spans) {
             let round = match band {
                 Band::Orders { .. } => None,
                 Band::Local { count } => Some(round(count)?),
@@ -96,7 +109,8 @@ impl PolarSplines {
             placed.push(Placed { band, at, round });
             at += band.len();
         }
-        Ok(Self { theta: BSpline::open(DEGREE, &breaks)?, bands: placed, len: at, phi_spans })
+        let theta = BSpline::open(DEGREE, &breaks)?;
+        Ok(Self { theta, bands: placed, len: at, breaks, phi_spans })
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -105,7 +119,10 @@ impl PolarSplines {
 
     /// The most places of a grid over a quarter turn that tell the functions apart.
     pub(crate) fn fineness(&self) -> usize {
-        self.theta.len().max(self.phi_spans.div_ceil(2))
+        let narrowest = self.breaks.windows(2).map(|two| two[1] - two[0]).fold(FRAC_PI_2, f64::min);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
+        let along = libm::ceil(FRAC_PI_2 / narrowest - 1e-6) as usize + DEGREE;
+        along.max(self.phi_spans.div_ceil(2))
     }
 
     /// All values in a direction; below the horizon those at it.
@@ -230,7 +247,7 @@ impl PolarSplines {
     pub(crate) fn name(&self, k: usize) -> String {
         let at = self.bands.partition_point(|placed| placed.at <= k) - 1;
         let placed = &self.bands[at];
-        let theta_deg = greville(at, self.theta.len() - DEGREE).to_degrees();
+        let theta_deg = greville(at, &self.breaks).to_degrees();
         match placed.band {
             Band::Local { count } => {
                 // A cubic spline is centred two spans after its support begins; the first one's

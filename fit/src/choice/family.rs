@@ -72,13 +72,14 @@ impl Family {
         Ok(Self { spec, region: *region, rows, values, u: u.to_vec() })
     }
 
-    /// Scores a basis of the family with the penalty that the data ask for.
+    /// Scores a basis of the family with the penalty that the data ask for; and the residuals over the
+    /// readings' u.
     pub(super) fn trial(
         &self,
         spec: BasisSpec,
         strengths: Strengths,
         folds: &[Vec<usize>],
-    ) -> Result<Option<Trial>, FitError> {
+    ) -> Result<Option<(Trial, Vec<f64>)>, FitError> {
         let basis = Basis::new(spec, self.region)?;
         let rows = self.columns(spec);
         let solution = triangle(&rows, &self.values).ok_or(FitError::OutOfRange)?;
@@ -91,8 +92,9 @@ impl Family {
         let Some(found) = self.left_out(&rows, &solution, &prior, scale, folds) else {
             return Ok(None);
         };
-        let (score, left_out, misfit) = found;
-        Ok(Some(Trial { penalty, coefficients: basis.len(), score, left_out, misfit }))
+        let (score, left_out, misfit, residuals) = found;
+        let trial = Trial { penalty, coefficients: basis.len(), score, left_out, misfit };
+        Ok(Some((trial, residuals)))
     }
 
     /// The likeliest penalty, and the variance of the readings over their stated one.
@@ -145,7 +147,7 @@ impl Family {
         prior: &Prior,
         scale: f64,
         folds: &[Vec<usize>],
-    ) -> Option<(f64, f64, f64)> {
+    ) -> Option<(f64, f64, f64, Vec<f64>)> {
         let p = rows.ncols();
         let mut triangle = Triangle::new(p, 1);
         let z = whole.rotated(0);
@@ -190,7 +192,8 @@ impl Family {
         let is_sound = count > 0.0 && f64::is_finite(score);
         is_sound.then(|| {
             let misfit = self.misfit(&fitted, spread.squared_norm_l2());
-            (score / count, (squares / count).sqrt(), misfit)
+            let residuals = self.values.iter().enumerate().map(|(i, v)| v - fitted[(i, 0)]);
+            (score / count, (squares / count).sqrt(), misfit, residuals.collect())
         })
     }
 
@@ -255,4 +258,4 @@ fn triangle(rows: &Mat<f64>, values: &[f64]) -> Option<Solution> {
 /// would be who calls all of the lobe noise.
 const FREEDOM: f64 = 4.0;
 /// Powers of the degree that a penalty is tried with: from fields with edges to very smooth ones.
-const POWERS: [f64; 3] = [1.0, 2.0, 3.0];
+const POWERS: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];

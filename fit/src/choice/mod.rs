@@ -8,16 +8,17 @@
 
 mod evidence;
 mod family;
+mod search;
 mod sweeps;
 
 use crate::beam::Optics;
 use crate::check::check;
 use crate::grid::Grid;
-use crate::weights::{Model, has_unknown};
 use crate::{
     Angular, BasisSpec, Chart, FitError, Penalised, Penalty, Position, Ray, Region, Rules, Sample,
 };
-use family::{Family, Strengths, Trial};
+use family::{Strengths, Trial};
+use search::Search;
 
 pub use sweeps::SweepKind;
 pub(crate) use sweeps::Sweeps;
@@ -172,8 +173,9 @@ pub struct Candidate {
 /// Chooses what the wish leaves open, for samples as [`fit_seen`](crate::fit_seen) takes them. `None`
 /// for the choice where nothing was open.
 ///
-/// The choice depends on the samples' order by rounding alone. It is made from at most 3000 readings,
-/// whole sweeps of them, and among bases of at most 400 coefficients (and no more than readings).
+/// The choice depends on the samples' order by rounding alone. It is made from at most 6000 readings,
+/// whole sweeps of them, and among bases of at most 1000 coefficients (and no more than readings);
+/// where rows are averaged over a beam, from 3000 and among those of 400.
 pub fn choose(
     samples: &[Sample],
     region: &Region,
@@ -186,7 +188,7 @@ pub fn choose(
     }
     check(samples, region, smallest(region, 0, 0).into(), &[])?;
     one_pose(samples, region)?;
-    let sweeps = Sweeps::of(samples, region).thinned(READINGS_MAX);
+    let sweeps = Sweeps::of(samples, region).thinned(search::readings_max(optics));
     let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
     let mut search = Search::new(&chosen, region, wish, optics, &sweeps);
     search.run()?;
@@ -280,208 +282,9 @@ fn truncation(tried: &[(BasisSpec, Trial)]) -> f64 {
     falling.clamp(0.0, chosen.misfit).sqrt()
 }
 
-/// The candidates tried so far.
-struct Search<'s> {
-    samples: &'s [Sample],
-    region: &'s Region,
-    wish: &'s Wish,
-    optics: Option<&'s Optics>,
-    u: Vec<f64>,
-    strengths: Strengths,
-    folds: Vec<Vec<usize>>,
-    /// Highest degree in position that is tried.
-    position_most: usize,
-    coefficients_max: usize,
-    tried: Vec<(BasisSpec, Trial)>,
-}
-
-impl<'s> Search<'s> {
-    fn new(
-        samples: &'s [Sample],
-        region: &'s Region,
-        wish: &'s Wish,
-        optics: Option<&'s Optics>,
-        sweeps: &Sweeps,
-    ) -> Self {
-        let model = Model::of(samples);
-        let grid = Grid::of(samples, region);
-        let distinct = grid.x_m.len().max(grid.y_m.len());
-        // What the residuals have to say about noise that is not stated.
-        let scale_min = if has_unknown(samples) { SCALE_LEAST } else { 1.0 };
-        Self {
-            samples,
-            region,
-            wish,
-            optics,
-            u: samples.iter().map(|sample| model.u_of(sample)).collect(),
-            strengths: wish.strengths(scale_min),
-            folds: sweeps.folds(FOLDS),
-            position_most: distinct.saturating_sub(1).min(POSITION_MOST),
-            coefficients_max: COEFFICIENTS_MAX.min(samples.len()),
-            tried: Vec::new(),
-        }
-    }
-
-    fn run(&mut self) -> Result<(), FitError> {
-        let position = self.position()?;
-        let kinds: &[AngularKind] = match self.wish.kind {
-            Some(AngularKind::Zernike) => &[AngularKind::Zernike],
-            Some(AngularKind::Hemispherical) => &[AngularKind::Hemispherical],
-            Some(AngularKind::EvenHarmonics) => &[AngularKind::EvenHarmonics],
-            Some(AngularKind::Splines) => &[AngularKind::Splines],
-            Some(AngularKind::Spherical) => &[AngularKind::Spherical],
-            Some(AngularKind::SecondPlane) => &[AngularKind::SecondPlane],
-            None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
-            None => &[AngularKind::Zernike, AngularKind::Hemispherical, AngularKind::Splines],
-        };
-        for kind in kinds {
-            self.rising(&self.angular(*kind), position)?;
-        }
-        // The best direction's basis may ask for another degree in position.
-        let best = self.tried.iter().max_by(|a, b| a.1.score.total_cmp(&b.1.score));
-        if let (Some((spec, _)), None) = (best, self.wish.position_degree) {
-            let (angular, degree) = (spec.angular, spec.position.degree().unwrap_or(0));
-            for degree in [degree.saturating_sub(1), degree + 1] {
-                self.rising(&[angular], degree)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The degree in position that a middling basis of the direction does best with.
-    fn position(&mut self) -> Result<usize, FitError> {
-        if let Some(degree) = self.wish.position_degree {
-            return Ok(degree);
-        }
-        let degree = self.wish.angular_degree.unwrap_or(MIDDLING).min(MIDDLING);
-        let columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
-        let angular = match self.region.chart {
-            Chart::Surface => Angular::Zernike { degree, cosine_columns: columns },
-            _ => smallest(self.region, degree, 0).angular,
-        };
-        let mut most = self.position_most;
-        let spec = |degree| BasisSpec { angular, position: Position::Legendre { degree } };
-        while most > 0 && spec(most).len() > self.coefficients_max {
-            most -= 1;
-        }
-        if most == 0 {
-            return Ok(0);
-        }
-        let family = Family::new(spec(most), self.region, self.samples, &self.u, self.optics)?;
-        let mut best = (0, f64::NEG_INFINITY);
-        for degree in 0..=most {
-            let Some(trial) = family.trial(spec(degree), self.strengths, &self.folds)? else {
-                break;
-            };
-            if trial.score <= best.1 {
-                break;
-            }
-            best = (degree, trial.score);
-        }
-        Ok(best.0)
-    }
-
-    /// Candidates of a kind, rising.
-    fn angular(&self, kind: AngularKind) -> Vec<Angular> {
-        let degrees = |list: &[usize]| match self.wish.angular_degree {
-            Some(degree) => vec![degree],
-            None => list.to_vec(),
-        };
-        let cosine_columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
-        match kind {
-            AngularKind::Zernike => degrees(&ZERNIKE)
-                .into_iter()
-                .map(|degree| Angular::Zernike { degree, cosine_columns })
-                .collect(),
-            AngularKind::Hemispherical => degrees(&HEMISPHERICAL)
-                .into_iter()
-                .map(|degree| Angular::Hemispherical { degree })
-                .collect(),
-            AngularKind::EvenHarmonics => degrees(&ZERNIKE)
-                .into_iter()
-                .map(|degree| Angular::EvenHarmonics { degree })
-                .collect(),
-            AngularKind::Spherical => degrees(&SPHERICAL)
-                .into_iter()
-                .map(|degree| Angular::Spherical { degree })
-                .collect(),
-            AngularKind::SecondPlane => degrees(&SECOND_PLANE)
-                .into_iter()
-                .map(|degree| Angular::SecondPlane { degree })
-                .collect(),
-            AngularKind::Splines => SPLINES
-                .into_iter()
-                .map(|(theta_spans, phi_spans)| Angular::Splines { theta_spans, phi_spans })
-                .collect(),
-        }
-    }
-
-    /// Tries ever finer bases until finer ones do no better.
-    fn rising(&mut self, list: &[Angular], degree: usize) -> Result<(), FitError> {
-        if degree > self.position_most && self.wish.position_degree.is_none() {
-            return Ok(());
-        }
-        let position = Position::Legendre { degree };
-        let affordable = |angular: &&Angular| {
-            BasisSpec { angular: **angular, position }.len() <= self.coefficients_max
-                || self.wish.angular_degree.is_some()
-        };
-        let list: Vec<Angular> = list.iter().filter(affordable).copied().collect();
-        let (mut best, mut worse) = (f64::NEG_INFINITY, 0);
-        let mut at = 0;
-        while at < list.len() && worse < WORSE_MAX {
-            // Splines are not nested; of the others a few at a time share rows.
-            let nested = list[at].degree().is_some();
-            let end = if nested { (at + SHARING).min(list.len()) } else { at + 1 };
-            let spec = BasisSpec { angular: list[end - 1], position };
-            let family = Family::new(spec, self.region, self.samples, &self.u, self.optics)?;
-            for angular in &list[at..end] {
-                let spec = BasisSpec { angular: *angular, position };
-                if worse == WORSE_MAX || self.tried.iter().any(|(tried, _)| *tried == spec) {
-                    continue;
-                }
-                let Some(trial) = family.trial(spec, self.strengths, &self.folds)? else {
-                    worse += 1;
-                    continue;
-                };
-                self.tried.push((spec, trial));
-                worse = if trial.score > best { 0 } else { worse + 1 };
-                best = best.max(trial.score);
-            }
-            at = end;
-        }
-        Ok(())
-    }
-}
-
-/// Readings that a choice is made from at most.
-const READINGS_MAX: usize = 3000;
-/// Coefficients of a basis that is chosen at most: what is finer has to be asked for by name.
-const COEFFICIENTS_MAX: usize = 400;
-/// Folds that the sweeps are dealt into.
-const FOLDS: usize = 16;
-/// Degrees tried in position at most: the sample is smooth, or it asks for splines by name.
-const POSITION_MOST: usize = 4;
-/// Degree in direction while that in position is looked for.
-const MIDDLING: usize = 6;
-/// Of every Zernike basis that is tried.
-const COSINE_COLUMNS: usize = 2;
 /// A basis with fewer functions by this factor is a coarser one.
 const COARSER: f64 = 1.2;
 /// What a finer basis may cost in log density a reading: a tenth of u.
 const FINER_COST: f64 = 0.1;
-/// A basis has to fail this often before finer ones are given up.
-const WORSE_MAX: usize = 3;
-/// Bases that share rows.
-const SHARING: usize = 5;
-const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
-const HEMISPHERICAL: [usize; 8] = [2, 4, 6, 8, 10, 12, 15, 18];
-const SPHERICAL: [usize; 10] = [0, 1, 2, 4, 6, 8, 10, 12, 15, 18];
-const SECOND_PLANE: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 10, 12];
-/// Spans of θ, and of φ round the horizon.
-const SPLINES: [(usize, usize); 8] =
-    [(4, 8), (7, 12), (12, 8), (10, 16), (20, 10), (14, 20), (20, 16), (20, 26)];
-/// Of variances that nothing was stated about, in units of what they are taken for.
-const SCALE_LEAST: f64 = 1e-12;
 /// Azimuths closer than half a degree are one where all else is.
 const ANGLE_OF_A_POSE: f64 = 0.009;

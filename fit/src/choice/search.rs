@@ -1,0 +1,331 @@
+//! Which bases are tried, in what order, and when to stop: ever finer ones until finer ones do no
+//! better, and splines finer in θ where their residuals say so.
+
+use super::family::{Family, Strengths, Trial};
+use super::{AngularKind, Sweeps, Wish, smallest};
+use crate::beam::Optics;
+use crate::grid::Grid;
+use crate::weights::{Model, has_unknown};
+use crate::{Angular, BasisSpec, Chart, Fine, FitError, Position, Region, Sample};
+use std::f64::consts::FRAC_PI_2;
+
+/// Readings that a choice is made from at most.
+pub(super) fn readings_max(optics: Option<&Optics>) -> usize {
+    if optics.is_some() { AVERAGED_READINGS_MAX } else { READINGS_MAX }
+}
+
+/// The candidates tried so far.
+pub(super) struct Search<'s> {
+    samples: &'s [Sample],
+    region: &'s Region,
+    wish: &'s Wish,
+    optics: Option<&'s Optics>,
+    u: Vec<f64>,
+    strengths: Strengths,
+    folds: Vec<Vec<usize>>,
+    /// Highest degree in position that places tell apart.
+    position_most: usize,
+    coefficients_max: usize,
+    pub(super) tried: Vec<(BasisSpec, Trial)>,
+}
+
+impl<'s> Search<'s> {
+    pub(super) fn new(
+        samples: &'s [Sample],
+        region: &'s Region,
+        wish: &'s Wish,
+        optics: Option<&'s Optics>,
+        sweeps: &Sweeps,
+    ) -> Self {
+        let model = Model::of(samples);
+        let grid = Grid::of(samples, region);
+        let distinct = grid.x_m.len().max(grid.y_m.len());
+        let most = if optics.is_some() { AVERAGED_COEFFICIENTS_MAX } else { COEFFICIENTS_MAX };
+        // What the residuals have to say about noise that is not stated.
+        let scale_min = if has_unknown(samples) { SCALE_LEAST } else { 1.0 };
+        Self {
+            samples,
+            region,
+            wish,
+            optics,
+            u: samples.iter().map(|sample| model.u_of(sample)).collect(),
+            strengths: wish.strengths(scale_min),
+            folds: sweeps.folds(FOLDS),
+            position_most: distinct.saturating_sub(1),
+            coefficients_max: most.min(samples.len()),
+            tried: Vec::new(),
+        }
+    }
+
+    pub(super) fn run(&mut self) -> Result<(), FitError> {
+        let position = Position::Legendre { degree: self.position()? };
+        let kinds: &[AngularKind] = match &self.wish.kind {
+            Some(kind) => std::slice::from_ref(kind),
+            None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
+            None => &[AngularKind::Zernike, AngularKind::Hemispherical, AngularKind::Splines],
+        };
+        for kind in kinds {
+            self.rising(&self.angular(*kind), position)?;
+        }
+        if kinds.contains(&AngularKind::Splines) {
+            self.refine(position)?;
+        }
+        // The best direction's basis may ask for another degree in position.
+        let Some((best, _)) = self.best(|_| true) else { return Ok(()) };
+        if let (Some(degree), None) = (best.position.degree(), self.wish.position_degree) {
+            self.places(best.angular, degree)?;
+        }
+        Ok(())
+    }
+
+    /// The degree in position that a middling basis of the direction does best with: as fine a
+    /// basis as the degree leaves room for.
+    fn position(&self) -> Result<usize, FitError> {
+        if let Some(degree) = self.wish.position_degree {
+            return Ok(degree);
+        }
+        let mut best = (0, f64::NEG_INFINITY);
+        for middling in MIDDLING {
+            let degree = self.wish.angular_degree.unwrap_or(middling).min(middling);
+            let angular = match (&self.region.chart, self.wish.angular_degree) {
+                (Chart::Surface, None) => {
+                    Angular::Zernike { degree, cosine_columns: COSINE_COLUMNS }
+                }
+                _ => smallest(self.region, degree, 0).angular,
+            };
+            let spec = |degree| BasisSpec { angular, position: Position::Legendre { degree } };
+            let affordable =
+                |degree: &usize| *degree <= self.position_most && self.is_affordable(spec(*degree));
+            let degrees: Vec<usize> = POSITION.into_iter().filter(affordable).collect();
+            let Some(most) = degrees.last().filter(|most| **most > 0) else { continue };
+            let family = self.family(spec(*most))?;
+            let mut worse = 0;
+            for &degree in &degrees {
+                let Some((trial, _)) = family.trial(spec(degree), self.strengths, &self.folds)?
+                else {
+                    break;
+                };
+                // What is even in x is not told by degree 1, and so on.
+                worse = if trial.score > best.1 { 0 } else { worse + 1 };
+                if trial.score > best.1 {
+                    best = (degree, trial.score);
+                }
+                if worse == WORSE_MAX {
+                    break;
+                }
+            }
+        }
+        Ok(best.0)
+    }
+
+    /// Candidates of a kind, rising.
+    fn angular(&self, kind: AngularKind) -> Vec<Angular> {
+        let degrees = |list: &[usize]| match self.wish.angular_degree {
+            Some(degree) => vec![degree],
+            None => list.to_vec(),
+        };
+        let cosine_columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
+        match kind {
+            AngularKind::Zernike => degrees(&ZERNIKE)
+                .into_iter()
+                .map(|degree| Angular::Zernike { degree, cosine_columns })
+                .collect(),
+            AngularKind::Hemispherical => degrees(&HEMISPHERICAL)
+                .into_iter()
+                .map(|degree| Angular::Hemispherical { degree })
+                .collect(),
+            AngularKind::EvenHarmonics => degrees(&ZERNIKE)
+                .into_iter()
+                .map(|degree| Angular::EvenHarmonics { degree })
+                .collect(),
+            AngularKind::Spherical => degrees(&SPHERICAL)
+                .into_iter()
+                .map(|degree| Angular::Spherical { degree })
+                .collect(),
+            AngularKind::SecondPlane => degrees(&SECOND_PLANE)
+                .into_iter()
+                .map(|degree| Angular::SecondPlane { degree })
+                .collect(),
+            AngularKind::Splines => SPLINES
+                .into_iter()
+                .map(|(theta_spans, phi_spans)| Angular::Splines {
+                    theta_spans,
+                    phi_spans,
+                    fine: Fine::NONE,
+                })
+                .collect(),
+        }
+    }
+
+    /// Tries ever finer bases until finer ones do no better.
+    fn rising(&mut self, list: &[Angular], position: Position) -> Result<(), FitError> {
+        let affordable = |angular: &&Angular| {
+            self.is_affordable(BasisSpec { angular: **angular, position })
+                || self.wish.angular_degree.is_some()
+        };
+        let list: Vec<Angular> = list.iter().filter(affordable).copied().collect();
+        let (mut best, mut worse) = (f64::NEG_INFINITY, 0);
+        let mut at = 0;
+        while at < list.len() && worse < WORSE_MAX {
+            // Splines are not nested; of the others a few at a time share rows.
+            let nested = list[at].degree().is_some();
+            let end = if nested { (at + SHARING).min(list.len()) } else { at + 1 };
+            let family = self.family(BasisSpec { angular: list[end - 1], position })?;
+            for angular in &list[at..end] {
+                let spec = BasisSpec { angular: *angular, position };
+                if worse == WORSE_MAX || self.has(spec) {
+                    continue;
+                }
+                let Some((trial, _)) = family.trial(spec, self.strengths, &self.folds)? else {
+                    worse += 1;
+                    continue;
+                };
+                self.tried.push((spec, trial));
+                worse = if trial.score > best { 0 } else { worse + 1 };
+                best = best.max(trial.score);
+            }
+            at = end;
+        }
+        Ok(())
+    }
+
+    /// Halves the spans of θ in which the best splines leave residuals, again and again, while that
+    /// does better. Where splines are not among the best, nothing is narrow.
+    fn refine(&mut self, position: Position) -> Result<(), FitError> {
+        let is_splines = |spec: &BasisSpec| matches!(spec.angular, Angular::Splines { .. });
+        let (Some((mut spec, mut trial)), Some((_, all))) =
+            (self.best(is_splines), self.best(|_| true))
+        else {
+            return Ok(());
+        };
+        if trial.score < all.score - NEAR || spec.position != position {
+            return Ok(());
+        }
+        let again = self.family(spec)?.trial(spec, self.strengths, &self.folds)?;
+        let Some((_, mut residuals)) = again else { return Ok(()) };
+        while let Some(angular) = self.finer(spec.angular, &residuals) {
+            let finer = BasisSpec { angular, position };
+            if !self.is_affordable(finer) || self.has(finer) {
+                break;
+            }
+            let found = self.family(finer)?.trial(finer, self.strengths, &self.folds)?;
+            let Some((next, left)) = found else { break };
+            self.tried.push((finer, next));
+            if next.score <= trial.score {
+                break;
+            }
+            (spec, trial, residuals) = (finer, next, left);
+        }
+        Ok(())
+    }
+
+    /// The same splines with the spans halved in which residuals exceed what they are elsewhere.
+    fn finer(&self, angular: Angular, residuals: &[f64]) -> Option<Angular> {
+        let Angular::Splines { theta_spans, phi_spans, fine } = angular else { return None };
+        let mut sums = vec![(0.0, 0.0); theta_spans];
+        for (sample, residual) in self.samples.iter().zip(residuals) {
+            let at = sample.ray.theta_rad / FRAC_PI_2 * theta_spans as f64;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a place in a list
+            let (sum, count) = &mut sums[(at.max(0.0) as usize).min(theta_spans - 1)];
+            *sum += residual * residual;
+            *count += 1.0;
+        }
+        let means: Vec<f64> =
+            sums.iter().map(|(sum, count)| if *count > 0.0 { sum / count } else { 0.0 }).collect();
+        let mut sorted: Vec<f64> = means.iter().copied().filter(|mean| *mean > 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let least = RESIDUES * sorted.get(sorted.len() / 2)?;
+        let is_off = |mean: &f64| *mean > least;
+        let from = means.iter().position(is_off)?.saturating_sub(1);
+        let to = (means.iter().rposition(is_off)? + 2).min(theta_spans);
+        let fine = if fine.is_none() {
+            Fine { from, to, halvings: 1 }
+        } else {
+            Fine { halvings: fine.halvings + 1, ..fine }
+        };
+        Some(Angular::Splines { theta_spans, phi_spans, fine })
+    }
+
+    /// Tries other functions of the position with a basis of the direction.
+    fn places(&mut self, angular: Angular, degree: usize) -> Result<(), FitError> {
+        let at = POSITION.iter().position(|d| *d == degree).unwrap_or(0);
+        let around = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
+        let mut others: Vec<Position> = around
+            .filter_map(|at| POSITION.get(at))
+            .filter(|degree| **degree <= self.position_most)
+            .map(|degree| Position::Legendre { degree: *degree })
+            .collect();
+        // Averaged over a beam, splines in position cost minutes.
+        if degree >= POSITION_SPLINES_FROM && self.optics.is_none() {
+            let spans = POSITION_SPLINES.into_iter().filter(|spans| *spans <= self.position_most);
+            others.extend(spans.map(|spans| Position::Splines { spans }));
+        }
+        for position in others {
+            self.rising(&[angular], position)?;
+        }
+        Ok(())
+    }
+
+    fn family(&self, spec: BasisSpec) -> Result<Family, FitError> {
+        Family::new(spec, self.region, self.samples, &self.u, self.optics)
+    }
+
+    fn best(&self, of: impl Fn(&BasisSpec) -> bool) -> Option<(BasisSpec, Trial)> {
+        let among = self.tried.iter().filter(|(spec, _)| of(spec));
+        among.max_by(|a, b| a.1.score.total_cmp(&b.1.score)).copied()
+    }
+
+    fn has(&self, spec: BasisSpec) -> bool {
+        self.tried.iter().any(|(tried, _)| *tried == spec)
+    }
+
+    fn is_affordable(&self, spec: BasisSpec) -> bool {
+        spec.len() <= self.coefficients_max
+    }
+}
+
+/// Readings that a choice is made from at most, and where rows are averaged over a beam.
+const READINGS_MAX: usize = 6000;
+const AVERAGED_READINGS_MAX: usize = 3000;
+/// Coefficients of a basis that is chosen at most: what is finer has to be asked for by name.
+const COEFFICIENTS_MAX: usize = 1000;
+/// The same where rows are averaged over a beam, which costs milliseconds a row beyond.
+const AVERAGED_COEFFICIENTS_MAX: usize = 400;
+/// Folds that the sweeps are dealt into.
+const FOLDS: usize = 16;
+/// Total degrees tried in position.
+const POSITION: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 11, 14];
+/// Spans of splines tried in position, and the degree from which on they are.
+const POSITION_SPLINES: [usize; 4] = [4, 6, 9, 12];
+const POSITION_SPLINES_FROM: usize = 4;
+/// Degrees in direction while that in position is looked for.
+const MIDDLING: [usize; 2] = [6, 2];
+/// Of every Zernike basis that is tried.
+const COSINE_COLUMNS: usize = 2;
+/// A basis has to fail this often before finer ones are given up.
+const WORSE_MAX: usize = 3;
+/// Splines that score less than the best by more than this are not refined.
+const NEAR: f64 = 0.3;
+/// Squared residuals over their median over θ that call for finer spans.
+const RESIDUES: f64 = 1.5;
+/// Bases that share rows.
+const SHARING: usize = 5;
+const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
+const HEMISPHERICAL: [usize; 8] = [2, 4, 6, 8, 10, 12, 15, 18];
+const SPHERICAL: [usize; 10] = [0, 1, 2, 4, 6, 8, 10, 12, 15, 18];
+const SECOND_PLANE: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 10, 12];
+/// Spans of θ, and of φ round the horizon.
+const SPLINES: [(usize, usize); 10] = [
+    (4, 8),
+    (7, 12),
+    (12, 8),
+    (10, 16),
+    (20, 10),
+    (14, 20),
+    (20, 16),
+    (20, 26),
+    (36, 12),
+    (36, 20),
+];
+/// Of variances that nothing was stated about, in units of what they are taken for.
+const SCALE_LEAST: f64 = 1e-12;
