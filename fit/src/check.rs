@@ -12,7 +12,7 @@ pub(crate) fn check(
     if !region.is_sound() {
         return Err(FitError::Region);
     }
-    let coefficients = model.basis.checked_len()?;
+    let coefficients = model.basis.checked_len_of_fit()?;
     model.check()?;
     if samples.is_empty() {
         return Err(FitError::Empty);

@@ -43,6 +43,13 @@ pub enum FitError {
         /// Where it pierces the second plane, metres.
         t_m: f64,
     },
+    /// What a fit in many local functions doesn't do: ask for fewer spans.
+    Sparse {
+        /// What was asked for.
+        wish: &'static str,
+        /// With more coefficients than this.
+        coefficients_from: usize,
+    },
     /// A basis out of its range: harmonics beyond degree 200, say.
     Basis {
         /// Which functions.
@@ -172,15 +179,12 @@ impl fmt::Display for FitError {
             Self::TooLarge { coefficients, coefficients_max } => {
                 write!(f, "{coefficients} coefficients are more than {coefficients_max}")
             }
-            Self::BasisOfChart { kind, chart } => write!(
+            Self::Sparse { wish, coefficients_from } => write!(
                 f,
-                "basis `{kind}`: it has no functions of the {chart} chart; expected {}",
-                match *chart {
-                    "surface" => "zernike, hemispherical, even-harmonics or splines",
-                    "two-plane" => "legendre",
-                    _ => "spherical",
-                }
+                "{wish}: not with more than {coefficients_from} splines; expected fewer spans, or to go \
+                 without"
             ),
+            Self::BasisOfChart { kind, chart } => basis_of_chart(f, kind, chart),
             Self::PlanesTooNear { distance_m } => write!(
                 f,
                 "planes {} mm apart are too near to each other for their size: the throughput \
@@ -281,3 +285,12 @@ fn undetermined(
 }
 
 impl std::error::Error for FitError {}
+
+fn basis_of_chart(f: &mut fmt::Formatter<'_>, kind: &str, chart: &str) -> fmt::Result {
+    let expected = match chart {
+        "surface" => "zernike, hemispherical, even-harmonics or splines",
+        "two-plane" => "legendre",
+        _ => "spherical",
+    };
+    write!(f, "basis `{kind}`: it has no functions of the {chart} chart; expected {expected}")
+}

@@ -7,10 +7,11 @@ use crate::beam::Optics;
 use crate::beam::design::readings;
 use crate::{
     BasisSpec, BeamRows, FitError, Functional, Influence, Penalised, Penalty, Ray, Region,
-    Truncation, Weighed,
+    Truncation, Weighed, sparse,
 };
 use radiometry::DomainError;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 /// A value with its combined standard uncertainty (k = 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +44,7 @@ pub struct Parts {
     pub coefficients: Vec<f64>,
     /// The upper triangular S of the independent covariance S Sᵀ (with a penalty the posterior's, see
     /// [`Penalty`]), packed by columns: S₀₀, S₀₁, S₁₁,
-    /// S₀₂, ...
+    /// S₀₂, ... Empty where [`Fit::is_sparse`]: such parts can't be taken up again.
     pub factor: Vec<f64>,
     /// The coefficients' shift by one u of each common component.
     pub shifts: Vec<CommonShift>,
@@ -99,6 +100,8 @@ pub struct Fit {
     parts: Parts,
     influence: Option<Influence>,
     weighed: Option<Weighed>,
+    /// Of a fit in many local functions, instead of the parts' factor.
+    sparse: Option<Arc<sparse::Factor>>,
 }
 
 impl Fit {
@@ -117,7 +120,27 @@ impl Fit {
             demand("shift", p, &common.shift)?;
         }
         let beyond = parts.truncation.as_ref().map(|t| beyond(t, p, parts.region)).transpose()?;
-        Ok(Self { basis, beyond, parts, influence: None, weighed: None })
+        Ok(Self { basis, beyond, parts, influence: None, weighed: None, sparse: None })
+    }
+
+    /// Of parts without a factor, whose covariance is the inverse of what a sparse one stands for.
+    pub(crate) fn of_sparse(
+        parts: Parts,
+        basis: Basis,
+        factor: Arc<sparse::Factor>,
+    ) -> Result<Self, FitError> {
+        demand("coefficients", basis.len(), &parts.coefficients)?;
+        for common in &parts.shifts {
+            demand("shift", basis.len(), &common.shift)?;
+        }
+        let sparse = Some(factor);
+        Ok(Self { basis, beyond: None, parts, influence: None, weighed: None, sparse })
+    }
+
+    /// Whether the fit is one in so many local functions that its covariance is not kept as a matrix:
+    /// [`covariance`](Self::covariance) then takes a solve a coefficient.
+    pub fn is_sparse(&self) -> bool {
+        self.sparse.is_some()
     }
 
     pub(crate) fn with_influence(self, influence: Influence) -> Self {
@@ -247,6 +270,11 @@ impl Fit {
     pub fn covariance(&self) -> Vec<Vec<f64>> {
         let p = self.basis.len();
         let mut covariance = vec![vec![0.0; p]; p];
+        if let Some(factor) = &self.sparse {
+            for (k, row) in covariance.iter_mut().enumerate() {
+                *row = factor.covariance(k);
+            }
+        }
         let shifts = self.parts.shifts.iter().map(|common| common.shift.as_slice());
         for outer in self.factor_columns().chain(shifts) {
             for (i, a) in outer.iter().enumerate() {
@@ -371,6 +399,9 @@ impl Fit {
 
     /// By what noise does to the fit.
     fn noise_variance(&self, functional: &Functional) -> f64 {
+        if let Some(factor) = &self.sparse {
+            return factor.variance(functional.row());
+        }
         self.factor_columns().map(|column| dot(column, functional.row()).powi(2)).sum()
     }
 
@@ -387,7 +418,8 @@ impl Fit {
 
     /// The columns of S down to the diagonal.
     fn factor_columns(&self) -> impl Iterator<Item = &[f64]> {
-        (0..self.basis.len()).map(|j| &self.parts.factor[j * (j + 1) / 2..][..=j])
+        let dense = if self.sparse.is_some() { 0 } else { self.basis.len() };
+        (0..dense).map(|j| &self.parts.factor[j * (j + 1) / 2..][..=j])
     }
 }
 

@@ -93,6 +93,7 @@ mod rules;
 mod sample;
 mod shift;
 mod solve;
+mod sparse;
 mod symmetry;
 pub mod triangle;
 mod truncation;

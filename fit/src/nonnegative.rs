@@ -10,7 +10,7 @@
 //! negative says more than the readings do, but to one side only, which no standard uncertainty tells.
 
 use crate::basis::dot;
-use crate::{Fit, FitError, Parts, Ray, Region};
+use crate::{Fit, FitError, Parts, Ray, Region, sparse};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
@@ -30,7 +30,11 @@ pub struct Nonnegative {
 impl Fit {
     /// The nearest field that is not below zero along any ray of a grid over the region, finer than
     /// the basis bends; between its rays it may be, by what a basis bends between two of them.
+    /// A fit in many local functions ([`is_sparse`](Self::is_sparse)) is refused.
     pub fn nonnegative(&self) -> Result<(Self, Nonnegative), FitError> {
+        if self.is_sparse() {
+            return Err(sparse::refusal("a field nowhere below zero"));
+        }
         let rays = grid(self.region(), self.functions().directions().fineness(), {
             self.functions().places().fineness()
         });

@@ -10,6 +10,7 @@
 //! count ((1 + n)^power)²; splines their mean square and that of their derivatives of order `power`.
 
 use crate::basis::{Basis, Derivative, Directions, PolarSplines, dot};
+use crate::sparse::Gram;
 use crate::triangle::{Solution, Triangle};
 use crate::{BasisSpec, FitError};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -253,22 +254,40 @@ fn place_root(basis: &Basis, power: f64) -> Result<Root, FitError> {
         let weight = |q: usize| libm::pow(1.0 + places.degree(q) as f64, power);
         return Ok(Root::Diagonal((0..places.len()).map(weight).collect()));
     }
-    let grams = places.grams()?;
-    let n = places.len();
-    Root::of(&Mat::from_fn(n, n, |p, q| grams.of(p, q).1))
+    Root::of(&place_roughness(basis, power)?)
 }
 
-/// ∫ (f² + roughness) dω/2π: of order 1 the squared gradient on the sphere, of order 2 the squared
-/// second derivatives `f_θθ`, `(f_θφ - cot θ f_φ)/sin θ` (twice) and `f_φφ/sin² θ + cot θ f_θ`, which
-/// are finite at the pole for what is smooth there.
+/// What is held against the functions of the position.
+fn place_roughness(basis: &Basis, power: f64) -> Result<Mat<f64>, FitError> {
+    let (places, n) = (basis.places(), basis.places().len());
+    if places.is_polynomial() {
+        let weight = |q: usize| libm::pow(1.0 + places.degree(q) as f64, 2.0 * power);
+        return Ok(Mat::from_fn(n, n, |p, q| if p == q { weight(q) } else { 0.0 }));
+    }
+    let grams = places.grams()?;
+    Ok(Mat::from_fn(n, n, |p, q| grams.of(p, q).1))
+}
+
 fn spline_root(splines: &PolarSplines, power: f64) -> Result<Root, FitError> {
+    let n = splines.len();
+    let mut matrix = Mat::<f64>::zeros(n, n);
+    spline_forms(splines, power, |form, weight| form.add_square(weight, &mut matrix))?;
+    Root::of(&matrix)
+}
+
+/// ∫ (f² + roughness) dω/2π as weighted squares of forms: of order 1 the squared gradient on the
+/// sphere, of order 2 the squared second derivatives `f_θθ`, `(f_θφ - cot θ f_φ)/sin θ` (twice) and
+/// `f_φφ/sin² θ + cot θ f_θ`, which are finite at the pole for what is smooth there.
+fn spline_forms(
+    splines: &PolarSplines,
+    power: f64,
+    mut hand: impl FnMut(&Form, f64),
+) -> Result<(), FitError> {
     let is_order = |order: f64| (power - order).abs() < 1e-9;
     if !is_order(1.0) && !is_order(2.0) {
         return Err(FitError::Penalty { penalty: Penalty { power, strength: 1.0 } });
     }
-    let n = splines.len();
-    let mut matrix = Mat::<f64>::zeros(n, n);
-    let mut form = Form { dense: vec![0.0; n], touched: Vec::new() };
+    let mut form = Form { dense: vec![0.0; splines.len()], touched: Vec::new() };
     for (theta, phi, weight) in splines.nodes() {
         let (sin, cos) = libm::sincos(theta);
         let (over, cot) = (1.0 / sin, cos / sin);
@@ -285,10 +304,46 @@ fn spline_root(splines: &PolarSplines, power: f64) -> Result<Root, FitError> {
         };
         for terms in forms {
             form.fill(splines, (theta, phi), terms)?;
-            form.add_square(weight / core::f64::consts::TAU, &mut matrix);
+            hand(&form, weight / core::f64::consts::TAU);
         }
     }
-    Root::of(&matrix)
+    Ok(())
+}
+
+/// P itself, the lower triangle by columns, where the functions of the direction are splines.
+pub(crate) fn sparse_roughness(
+    basis: &Basis,
+    splines: &PolarSplines,
+    power: f64,
+) -> Result<Vec<Vec<(usize, f64)>>, FitError> {
+    let n = splines.len();
+    let mut gram = Gram::new(n, 0);
+    spline_forms(splines, power, |form, weight| {
+        let root = weight.sqrt();
+        gram.absorb(form.touched.iter().map(|k| (*k, root * form.dense[*k])).collect(), &[]);
+    })?;
+    let (lower, _) = gram.finish();
+    let mut whole = lower.clone();
+    for (j, column) in lower.iter().enumerate() {
+        column.iter().filter(|(i, _)| *i != j).for_each(|(i, value)| whole[*i].push((j, *value)));
+    }
+    for column in &mut whole {
+        column.sort_unstable_by_key(|(i, _)| *i);
+    }
+    let places = place_roughness(basis, power)?;
+    let mut out = Vec::with_capacity(basis.len());
+    for q in 0..places.ncols() {
+        for j in 0..n {
+            let mut column = Vec::new();
+            for r in (q..places.nrows()).filter(|r| places[(*r, q)] != 0.0) {
+                let direction = if r == q { &lower[j] } else { &whole[j] };
+                let product = |(i, value): &(usize, f64)| (r * n + i, places[(r, q)] * value);
+                column.extend(direction.iter().map(product));
+            }
+            out.push(column);
+        }
+    }
+    Ok(out)
 }
 
 /// A linear form over the functions, of which few are not zero.

@@ -148,11 +148,11 @@ fn carried(
     let shifting: Vec<&Common> =
         common.iter().copied().filter(|c| needs_a_side(c, design)).collect();
     if shifting.is_empty() {
-        return Ok(shifts(common, &settled.coefficients, design, solution));
+        return Ok(shifts(common, &settled.coefficients, design, |side| solution.unknowns(side)));
     }
     let sides = sensitivities(design, settled, &shifting)?;
     let carried = solve_readings(design, &settled.variances, &sides, prior)?;
-    Ok(shifts(common, &settled.coefficients, design, &carried))
+    Ok(shifts(common, &settled.coefficients, design, |side| carried.unknowns(side)))
 }
 
 fn check_fields(samples: &[Sample], fields: &[Vec<f64>]) -> Result<(), FitError> {

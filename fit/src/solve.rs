@@ -15,7 +15,7 @@ use crate::penalty::{Penalised, Prior};
 use crate::readings::{Readings, Weighed};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, undetermined};
+use crate::{Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, sparse, undetermined};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -91,6 +91,9 @@ pub fn fit_readings(
     optics: Option<&Optics>,
 ) -> Result<Fit, FitError> {
     let model = model.into();
+    if sparse::is_called_for(model.basis) {
+        return sparse::fit(readings, region, model, optics);
+    }
     let Readings { samples, common, nuisances, limits, .. } = *readings;
     let (basis, prior) = ready(samples, region, model, common)?;
     check_readings(readings)?;
@@ -104,7 +107,7 @@ pub fn fit_readings(
     let solved = solve(&design, &settled.rows(), &sides, &prior)?;
     let solution = &solved.field;
     let coefficients = solution.unknowns(0);
-    let mut shifts = shifts(&common, &coefficients, &design, solution);
+    let mut shifts = shifts(&common, &coefficients, &design, |side| solution.unknowns(side));
     let own: Vec<Vec<f64>> =
         (0..nuisances.len()).map(|k| solution.unknowns(1 + sides.len() + k)).collect();
     let inverse = solution.inverse_matrix();
@@ -117,7 +120,8 @@ pub fn fit_readings(
         determined: prior.determined_by(solution),
         ..settled
     };
-    let quality = quality(&design, solution, &settled, limits)?;
+    let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
+    let quality = quality(&design, spectrum.condition(), &settled, limits);
     if prior.is_none() && settled.weights.contains(&0.0) {
         all_determined(&design, solution, &settled)?;
     }
@@ -133,7 +137,7 @@ pub fn fit_readings(
 }
 
 /// What readings came with that makes no sense.
-fn check_readings(readings: &Readings<'_>) -> Result<(), FitError> {
+pub(crate) fn check_readings(readings: &Readings<'_>) -> Result<(), FitError> {
     let Readings { samples, nuisances, limits, .. } = *readings;
     let is_sound = |c: &&Common| c.shift.is_shared() && c.u.is_finite() && c.u >= 0.0;
     if let Some(wrong) = nuisances.iter().find(|c| !is_sound(c)) {
@@ -164,7 +168,7 @@ fn all_determined(
     Err(undetermined::by_rank(&kept, design.basis()))
 }
 
-fn weighed(
+pub(crate) fn weighed(
     readings: &Readings<'_>,
     settled: &Settled,
     nuisances: Vec<crate::FittedNuisance>,
@@ -344,12 +348,13 @@ pub(crate) fn sensitivities(
     Ok(sides)
 }
 
-/// The coefficients' shift by one u of each component, in the order handed in.
+/// The coefficients' shift by one u of each component, in the order handed in; `unknowns` are those of
+/// a side, of which the first is the values'.
 pub(crate) fn shifts(
     common: &[&Common],
     coefficients: &[f64],
     design: &Design<'_>,
-    solution: &Solution,
+    unknowns: impl Fn(usize) -> Vec<f64>,
 ) -> Vec<CommonShift> {
     let mut side = 0;
     let mut shift = |c: &Common| match c.shift {
@@ -359,20 +364,19 @@ pub(crate) fn shifts(
         }
         Shift::Offset | Shift::Ray(_) | Shift::Jitter(_) | Shift::Value(_) => {
             side += 1;
-            solution.unknowns(side)
+            unknowns(side)
         }
     };
     common.iter().map(|c| CommonShift { name: c.name.clone(), shift: shift(c) }).collect()
 }
 
-fn quality(
+pub(crate) fn quality(
     design: &Design<'_>,
-    solution: &Solution,
+    condition: f64,
     settled: &Settled,
     limits: &[usize],
-) -> Result<Quality, FitError> {
+) -> Quality {
     let (samples, excess) = (design.samples(), settled.excess);
-    let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
     let model = Model::of(samples);
     let kept = settled.kept(limits);
     let (mut squares, mut chi2) = (0.0, 0.0);
@@ -387,8 +391,8 @@ fn quality(
         squares += square;
         chi2 += weight * square / (stated + unstated);
     }
-    Ok(Quality {
-        condition: spectrum.condition(),
+    Quality {
+        condition,
         n_used: settled.weights.iter().filter(|weight| **weight > 0.0).count(),
         dof: left_over(kept, settled.determined),
         determined: settled.determined,
@@ -396,7 +400,7 @@ fn quality(
         chi2,
         excess_rms: excess.sqrt(),
         beam: design.rows(&settled.variances),
-    })
+    }
 }
 
 /// Samples less what they determine of the coefficients, to the nearest number.

@@ -11,7 +11,7 @@
 
 use crate::basis::Basis;
 use crate::fitted::CommonShift;
-use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region};
+use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region, sparse};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
 
@@ -157,6 +157,9 @@ impl Fit {
     pub fn symmetric(&self, symmetry: Symmetry) -> Result<(Self, SymmetryTest), SymmetryError> {
         if !matches!(self.region().chart, Chart::Surface | Chart::Environment) {
             return Err(SymmetryError::Chart);
+        }
+        if self.is_sparse() {
+            return Err(SymmetryError::Fit(sparse::refusal("a symmetry")));
         }
         let p = self.coefficients().len();
         let basis = self.functions();

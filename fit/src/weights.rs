@@ -89,7 +89,7 @@ pub(crate) fn settle(
 }
 
 /// Before anything is fitted every sample is taken to lie at the mean of all.
-fn start(readings: &Readings<'_>, model: Model) -> Settled {
+pub(crate) fn start(readings: &Readings<'_>, model: Model) -> Settled {
     let samples = readings.samples;
     let n = samples.len();
     let mean = samples.iter().map(|s| s.value / n as f64).sum::<f64>();
@@ -160,7 +160,12 @@ impl Settled {
     }
 
     /// The weights by this fit; whether they are about as they were.
-    fn reweigh(&mut self, readings: &Readings<'_>, model: Model, robust: Robust) -> bool {
+    pub(crate) fn reweigh(
+        &mut self,
+        readings: &Readings<'_>,
+        model: Model,
+        robust: Robust,
+    ) -> bool {
         let (samples, limits) = (readings.samples, readings.limits);
         let expected = self.expected();
         let stated = model.variances(samples, self);
@@ -335,9 +340,9 @@ pub(crate) fn threshold(dof: f64) -> f64 {
 /// What a sample's uncertainty is taken for where only its size matters.
 const UNSTATED_RELATIVE: f64 = 1e-3;
 /// More passes than a fit with weights that settle needs (2 to 4).
-const PASSES_MAX: usize = 8;
+pub(crate) const PASSES_MAX: usize = 8;
 /// Outliers and limits need more: what is downweighted shows how large the others are.
-const REWEIGHING_MAX: usize = 40;
+pub(crate) const REWEIGHING_MAX: usize = 40;
 /// Weights are settled when no variance changes by more: the fit is stationary against its
 /// weights, so that what is left is of second order.
 const SETTLED_RELATIVE: f64 = 0.01;

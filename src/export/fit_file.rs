@@ -103,7 +103,9 @@ impl FitFile<'_> {
         put("resolves", self.resolves.map_or(Value::Null, resolves));
         put("region", region_json(fit.region()));
         put("coefficients", json!(fit.coefficients()));
-        put("covariance", json!(fit.covariance()));
+        // Of thousands of local functions it would be gigabytes.
+        let is_kept = !fit.is_sparse();
+        put("covariance", if is_kept { json!(fit.covariance()) } else { Value::Null });
         put("condition", json!(fit.condition()));
         put("residual_rms", json!(fit.residual_rms()));
         put("excess_rms", json!(fit.excess_rms()));

@@ -118,6 +118,26 @@ impl BasisSpec {
         }
     }
 
+    /// The same, if a fit of any kind may hold them: of functions that are local in direction more.
+    pub(crate) fn checked_len_of_fit(&self) -> Result<usize, FitError> {
+        match self.checked_len() {
+            Err(FitError::TooLarge { coefficients, .. }) if self.is_local() => {
+                if coefficients <= LOCAL_COEFFICIENTS_MAX {
+                    Ok(coefficients)
+                } else {
+                    let coefficients_max = LOCAL_COEFFICIENTS_MAX;
+                    Err(FitError::TooLarge { coefficients, coefficients_max })
+                }
+            }
+            decided => decided,
+        }
+    }
+
+    /// Whether the functions of the direction are zero but for a patch each.
+    pub(crate) fn is_local(&self) -> bool {
+        matches!(self.angular, Angular::Splines { .. })
+    }
+
     /// Number of coefficients at most: splines over a region without length in x or in y have fewer.
     pub fn len(&self) -> usize {
         self.angular.len().saturating_mul(self.position.len())
@@ -143,7 +163,7 @@ impl Angular {
             Self::EvenHarmonics { degree } | Self::SecondPlane { degree } => triangular(degree),
             // More spans than this have too many functions whatever they are.
             Self::Splines { theta_spans, phi_spans, fine }
-                if theta_spans.max(phi_spans) > COEFFICIENTS_MAX
+                if theta_spans.max(phi_spans) > LOCAL_COEFFICIENTS_MAX
                     || fine.halvings > HALVINGS_MAX =>
             {
                 usize::MAX
@@ -214,5 +234,7 @@ fn triangular(degree: usize) -> usize {
 
 /// Beyond it the triangle alone takes 134 MB, and the factorisation minutes.
 const COEFFICIENTS_MAX: usize = 4096;
+/// Of local functions: their factor takes about a gigabyte.
+const LOCAL_COEFFICIENTS_MAX: usize = 32_768;
 /// Spans beyond it are narrower than any encoder tells.
 const HALVINGS_MAX: usize = 8;
