@@ -19,6 +19,7 @@ import sys
 import time
 
 PEERS = ["lstsq", "gelsy", "lstsq-2", "dgeqrf", "ours"]
+LOCAL = [(20, 40), (26, 68), (30, 72), (40, 110), (60, 160), (80, 220), (110, 300)]
 NAMES = {
     "lstsq": "numpy.linalg.lstsq (gelsd)",
     "gelsy": "scipy.linalg.lstsq (gelsy)",
@@ -34,21 +35,22 @@ def main(solver, cases, figures, document, date, beside, *rest):
     errors = reference(solver, cases)
     rows = versus(solver, 100_000, 256, 2, PEERS)
     curves = against_rows(solver, 5 if short else 7) + against_columns(solver, 10 if short else 12)
-    write(figures, document, rows, curves, errors, date, beside)
+    local = against_spans(solver, LOCAL[:2] if short else LOCAL)
+    write(figures, document, rows, curves, local, errors, date, beside)
     if not short:
         # The slowest peers are left out: each would take as long again as all others together.
         rows += versus(solver, 1_000_000, 256, 1, ["ours", "dgeqrf", "lstsq"])
-        write(figures, document, rows, curves, errors, date, beside)
+        write(figures, document, rows, curves, local, errors, date, beside)
 
 
-def write(figures, document, rows, curves, errors, date, beside):
+def write(figures, document, rows, curves, local, errors, date, beside):
     with open(figures / "solver.csv", "w") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["what", "rows", "columns", "processor_s", "wall_s", "peak_mb", "error"])
         for name, n, p, cpu, wall, peak, error in rows + curves:
             out.writerow([name, n, p, f"{cpu:.4g}", f"{wall:.4g}", f"{peak:.4g}", f"{error:.2e}"])
     draw(curves, figures / "solver.svg")
-    text = report(rows, curves, errors, date, beside)
+    text = report(rows, curves, local, errors, date, beside)
     pathlib.Path(document).write_text(text)
 
 
@@ -74,16 +76,32 @@ def against_columns(solver, most):
     return [("columns", 8_192, 2**k, *ours(solver, 8_192, 2**k)) for k in range(6, most + 1)]
 
 
+def against_spans(solver, spans):
+    """Readings, functions, processor s, peak MB, RMS error over u: of splines, dense and sparse."""
+    found = []
+    for theta, phi in spans:
+        cpu, _, (count, error, peak_kib) = timed(solver, "local", 20_000, theta, phi)
+        found.append((20_000, int(count), cpu, peak_kib / 1024, error))
+        print("local", *found[-1], file=sys.stderr)
+    return found
+
+
 def ours(solver, n, p):
     """Processor and wall seconds, peak MB, error."""
+    cpu, wall, (error, peak_kib) = timed(solver, "stream", n, p)
+    return cpu, wall, peak_kib / 1024, error
+
+
+def timed(solver, *words):
+    """Processor and wall seconds, and the numbers that it prints."""
     began = time.perf_counter()
-    process = subprocess.Popen(["taskset", "--cpu-list", "0", solver, "stream", str(n), str(p)], stdout=subprocess.PIPE)
-    error, peak_kib = map(float, process.stdout.read().split())
+    command = ["taskset", "--cpu-list", "0", solver, *map(str, words)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE)
+    numbers = tuple(map(float, process.stdout.read().split()))
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     assert process.returncode == 0
-    wall = time.perf_counter() - began
-    return usage.ru_utime + usage.ru_stime, wall, peak_kib / 1024, error
+    return usage.ru_utime + usage.ru_stime, time.perf_counter() - began, numbers
 
 
 def of_peer(peer, n, p):
@@ -201,7 +219,7 @@ def draw(curves, path):
     figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
-def report(rows, curves, errors, date, beside):
+def report(rows, curves, local, errors, date, beside):
     lines = [
         "# The solver, measured",
         "",
@@ -237,6 +255,19 @@ def report(rows, curves, errors, date, beside):
     over = [row for row in curves if row[5] > (100 if row[2] <= 256 else 50 + 24 * row[2] ** 2 / 2**20)]
     said = "met" if not over else "missed at " + ", ".join(f"{row[1]:.0e} x {row[2]}" for row in over)
     lines += ["", f"Memory within 100 MB up to 256 coefficients and 50 MB + 3 x 8 p² bytes beyond: **{said}**.", ""]
+    lines += [
+        "## Many local functions",
+        "",
+        "A whole fit of 20,000 scattered readings in penalised splines of θ and φ, with its weights: up to 2,000 functions by the dense "
+        "triangle, beyond by the sparse factor. The error is the RMS of the field at other places over the readings' u.",
+        "",
+        "| functions | way | processor s | peak MB | error / u |",
+        "|---|---|---|---|---|",
+    ]
+    for _, count, cpu, peak, error in local:
+        way = "dense" if count <= 2000 else "sparse"
+        lines.append(f"| {count} | {way} | {cpu:.2f} | {peak:.0f} | {error:.3f} |")
+    lines += [""]
     lines += [
         "## Ill-conditioned reference cases",
         "",
