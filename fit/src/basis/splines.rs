@@ -53,11 +53,23 @@ pub(crate) fn bands(breaks: &[f64], phi_spans: usize) -> impl Iterator<Item = Ba
         1 => Band::Orders { first: 1, last: 1 },
         2 => Band::Orders { first: 0, last: 2 },
         _ => {
-            let round = libm::round(phi_spans as f64 * libm::sin(greville(i, breaks)));
+            let theta_rad = greville(i, breaks);
+            let round = (libm::sin(theta_rad) * finer(theta_rad, breaks)).min(1.0);
+            let round = libm::round(phi_spans as f64 * round);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small, positive
             Band::Local { count: (round as usize).max(PHI_SPANS_MIN) }
         }
     })
+}
+
+/// How many times narrower the span at θ is than the widest. A lobe that is narrow in θ near the pole
+/// bends in φ as much as one at the horizon.
+fn finer(theta_rad: f64, breaks: &[f64]) -> f64 {
+    let width = |span: &[f64]| span[1] - span[0];
+    let widest = breaks.windows(2).map(width).fold(0.0, f64::max);
+    let own = breaks.windows(2).find(|span| theta_rad < span[1]).map_or(widest, width);
+    // Halved spans are narrower by whole powers of 2.
+    libm::round(widest / own)
 }
 
 /// Where spline `i` over these breaks is centred: Greville's abscissa.

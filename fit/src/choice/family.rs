@@ -58,7 +58,8 @@ impl Family {
     ) -> Result<Self, FitError> {
         spec.checked_len()?;
         let basis = Basis::new(spec, *region)?;
-        let design = Design::new(samples, &basis, optics)?;
+        // Each row within a part of its own u is enough for a choice; a fit needs all of them together.
+        let design = Design::of_a_share(samples, &basis, optics, 1)?;
         let (n, p) = (samples.len(), basis.len());
         let mut rows = Mat::zeros(n, p);
         let (mut room, mut row) = (design.room(), vec![0.0; p]);
@@ -116,23 +117,27 @@ impl Family {
             return Ok(Some((Penalty::NONE, scale)));
         }
         let splines = matches!(basis.spec().angular, Angular::Splines { .. });
-        let some = [strengths.power.unwrap_or_default()];
-        let powers: &[f64] = match strengths.power {
-            Some(_) => &some,
-            None if splines => &[2.0],
-            None => &POWERS,
-        };
+        let some = [strengths.power.unwrap_or(2.0)];
+        let is_open = strengths.power.is_none() && !splines;
+        let powers: [&[f64]; 2] = if is_open { [&SMOOTHER, &ROUGHER] } else { [&some, &[]] };
         let mut best: Option<(f64, Likeliest)> = None;
-        for &power in powers {
-            let roughness = Roughness::new(basis, power)?;
-            let evidence = Evidence::new(solution, n, strengths.scale_min, &roughness)?;
-            let found = match strengths.strength {
-                Some(strength) => Some(evidence.with(strength)),
-                None => evidence.likeliest(),
-            };
-            let Some(found) = found else { continue };
-            if best.is_none_or(|(_, best)| found.deviance < best.deviance) {
+        // The deviance has one valley over the powers: down it until it rises.
+        for way in powers {
+            for &power in way {
+                let roughness = Roughness::new(basis, power)?;
+                let evidence = Evidence::new(solution, n, strengths.scale_min, &roughness)?;
+                let found = match strengths.strength {
+                    Some(strength) => Some(evidence.with(strength)),
+                    None => evidence.likeliest(),
+                };
+                let Some(found) = found else { continue };
+                if best.is_some_and(|(_, best)| found.deviance >= best.deviance) {
+                    break;
+                }
                 best = Some((power, found));
+            }
+            if best.is_some_and(|(power, _)| power > SMOOTHER[0]) {
+                break;
             }
         }
         Ok(best.map(|(power, found)| (Penalty { power, strength: found.strength }, found.scale)))
@@ -257,5 +262,7 @@ fn triangle(rows: &Mat<f64>, values: &[f64]) -> Option<Solution> {
 /// gap that a left-out sweep leaves surprises every basis: under a normal density the winner
 /// would be who calls all of the lobe noise.
 const FREEDOM: f64 = 4.0;
-/// Powers of the degree that a penalty is tried with: from fields with edges to very smooth ones.
-const POWERS: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
+/// Powers of the degree that a penalty is tried with: from middling fields to very smooth ones, and
+/// for fields with edges.
+const SMOOTHER: [f64; 4] = [2.0, 3.0, 5.0, 8.0];
+const ROUGHER: [f64; 1] = [1.0];

@@ -252,6 +252,7 @@ fn prefer_finer(tried: &mut [(BasisSpec, Trial)]) {
     let is_as_good = |(spec, other): &(BasisSpec, Trial)| {
         spec.angular.name() == best.angular.name()
             && spec.position.len() >= best.position.len()
+            && is_of_spans(best.angular, spec.angular)
             && !other.penalty.is_none()
             && other.score > trial.score - FINER_COST
     };
@@ -261,6 +262,21 @@ fn prefer_finer(tried: &mut [(BasisSpec, Trial)]) {
     if let Some(finest) = finest.filter(|i| tried[*i].1.coefficients > trial.coefficients) {
         tried[..=finest].rotate_right(1);
     }
+}
+
+/// Whether splines are compared with ones of the same spans where those of the first are finer in a
+/// stretch: elsewhere, nothing has to be followed.
+fn is_of_spans(first: Angular, other: Angular) -> bool {
+    let spans = |angular| match angular {
+        Angular::Splines { theta_spans, phi_spans, fine } => Some((theta_spans, phi_spans, fine)),
+        _ => None,
+    };
+    let (Some((theta, phi, fine)), Some((other_theta, other_phi, _))) =
+        (spans(first), spans(other))
+    else {
+        return true;
+    };
+    fine.is_none() || (theta, phi) == (other_theta, other_phi)
 }
 
 /// What the chosen basis, the first, can't follow: of the residuals beyond the stated noise the part

@@ -190,31 +190,50 @@ impl<'s> Search<'s> {
     }
 
     /// Halves the spans of θ in which the best splines leave residuals, again and again, while that
-    /// does better. Where splines are not among the best, nothing is narrow.
+    /// does better. Where splines are not among the best, nothing is narrow. Where it helps,
+    /// coarse splines are refined too: they follow a narrow lobe without being free elsewhere.
     fn refine(&mut self, position: Position) -> Result<(), FitError> {
         let is_splines = |spec: &BasisSpec| matches!(spec.angular, Angular::Splines { .. });
-        let (Some((mut spec, mut trial)), Some((_, all))) =
-            (self.best(is_splines), self.best(|_| true))
+        let (Some((spec, trial)), Some((_, all))) = (self.best(is_splines), self.best(|_| true))
         else {
             return Ok(());
         };
         if trial.score < all.score - NEAR || spec.position != position {
             return Ok(());
         }
-        let again = self.family(spec)?.trial(spec, self.strengths, &self.folds)?;
-        let Some((_, mut residuals)) = again else { return Ok(()) };
+        self.halve(spec)?;
+        if self.best(is_splines).is_none_or(|(best, _)| best == spec) {
+            return Ok(());
+        }
+        for (theta_spans, phi_spans) in COARSE {
+            let angular = Angular::Splines { theta_spans, phi_spans, fine: Fine::NONE };
+            let coarse = BasisSpec { angular, position };
+            if coarse != spec && self.is_affordable(coarse) {
+                self.halve(coarse)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Halves spans of splines as long as that does better.
+    fn halve(&mut self, start: BasisSpec) -> Result<(), FitError> {
+        let first = self.family(start)?.trial(start, self.strengths, &self.folds)?;
+        let Some((Trial { score, .. }, mut residuals)) = first else { return Ok(()) };
+        let (mut spec, mut best, mut worse) = (start, score, 0);
         while let Some(angular) = self.finer(spec.angular, &residuals) {
-            let finer = BasisSpec { angular, position };
+            let finer = BasisSpec { angular, ..spec };
             if !self.is_affordable(finer) || self.has(finer) {
                 break;
             }
             let found = self.family(finer)?.trial(finer, self.strengths, &self.folds)?;
             let Some((next, left)) = found else { break };
             self.tried.push((finer, next));
-            if next.score <= trial.score {
+            worse = if next.score > best { 0 } else { worse + 1 };
+            best = best.max(next.score);
+            if worse == HALVINGS_IN_VAIN {
                 break;
             }
-            (spec, trial, residuals) = (finer, next, left);
+            (spec, residuals) = (finer, left);
         }
         Ok(())
     }
@@ -236,12 +255,14 @@ impl<'s> Search<'s> {
         sorted.sort_by(f64::total_cmp);
         let least = RESIDUES * sorted.get(sorted.len() / 2)?;
         let is_off = |mean: &f64| *mean > least;
-        let from = means.iter().position(is_off)?.saturating_sub(1);
-        let to = (means.iter().rposition(is_off)? + 2).min(theta_spans);
+        let (from, to) = (means.iter().position(is_off)?, means.iter().rposition(is_off)? + 1);
+        // Anew each time: what is followed by now needs no finer spans.
         let fine = if fine.is_none() {
-            Fine { from, to, halvings: 1 }
+            Fine { from: from.saturating_sub(1), to: (to + 1).min(theta_spans), halvings: 1 }
         } else {
-            Fine { halvings: fine.halvings + 1, ..fine }
+            let (from, to) = (from.max(fine.from), to.min(fine.to));
+            let (from, to) = if from < to { (from, to) } else { (fine.from, fine.to) };
+            Fine { from, to, halvings: fine.halvings + 1 }
         };
         Some(Angular::Splines { theta_spans, phi_spans, fine })
     }
@@ -308,6 +329,10 @@ const WORSE_MAX: usize = 3;
 const NEAR: f64 = 0.3;
 /// Squared residuals over their median over θ that call for finer spans.
 const RESIDUES: f64 = 1.5;
+/// Halving may do no better this often before it is given up.
+const HALVINGS_IN_VAIN: usize = 2;
+/// Splines that a narrow lobe is followed with where the rest is smooth.
+const COARSE: [(usize, usize); 2] = [(4, 8), (7, 12)];
 /// Bases that share rows.
 const SHARING: usize = 5;
 const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
