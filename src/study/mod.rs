@@ -8,6 +8,7 @@ mod demand;
 mod forecast;
 mod frontier;
 mod ladder;
+mod nodes;
 mod parts;
 mod prior;
 mod score;
@@ -22,6 +23,7 @@ pub use frontier::{
     doubling, points,
 };
 pub use ladder::{LADDER, Rung};
+pub use nodes::{Fineness, Nodes};
 pub use parts::Budget;
 pub use prior::{Feature, Prior};
 pub use score::Score;

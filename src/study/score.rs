@@ -1,16 +1,8 @@
 //! How far a fitted radiance lies from a known one. It does not know where either comes from.
 
 use fit::{Ray, Region};
-use radiometry::quadrature::gauss_legendre;
 
-/// Nodes in sin²θ; the azimuth takes the trapezoid rule, which is exact for harmonics below half
-/// its count.
-const THETA_NODES: usize = 32;
-const PHI_NODES: u32 = 48;
-/// Equal parts of each of x and y, and the nodes in each. A polynomial would do with fewer; an
-/// emitter that ends inside the region is seen the better the more evenly they stand.
-const POSITION_PARTS: u32 = 3;
-const POSITION_NODES: usize = 2;
+use super::{Fineness, Nodes};
 
 /// How far a fit lies from the truth: throughput-weighted RMS over a region, each divided by the
 /// truth's own, so numbers without a unit. The weight is dT = cos θ dω dA, over the region's
@@ -36,9 +28,18 @@ impl Score {
         fitted: impl Fn(&Ray) -> f64,
         truth: impl Fn(&Ray) -> f64,
     ) -> Option<Self> {
-        let pairs = pairs(region, fitted, truth);
+        let nodes = Nodes::of(region, Fineness::USUAL);
+        let at = |field: &dyn Fn(&Ray) -> f64| -> Vec<f64> {
+            nodes.rays().map(|(ray, _)| field(&ray)).collect()
+        };
+        Self::of_values(&nodes, &at(&fitted), &at(&truth))
+    }
+
+    /// The same of values at the nodes' rays, in their order.
+    pub fn of_values(nodes: &Nodes, fitted: &[f64], truth: &[f64]) -> Option<Self> {
+        let values = || nodes.rays().map(|(_, weight)| weight).zip(fitted.iter().zip(truth));
         let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-            pairs.iter().map(|(weight, fitted, truth)| weight * f(*fitted, *truth)).sum()
+            values().map(|(weight, (fitted, truth))| weight * f(*fitted, *truth)).sum()
         };
         let signal = sum(&|_, truth| truth * truth);
         if signal <= 0.0 {
@@ -52,46 +53,6 @@ impl Score {
         };
         Some(Self { rms_relative: rms(1.0), shape_rms_relative: rms(factor), factor })
     }
-}
-
-/// Weight, fitted and true radiance at every node.
-fn pairs(
-    region: &Region,
-    fitted: impl Fn(&Ray) -> f64,
-    truth: impl Fn(&Ray) -> f64,
-) -> Vec<(f64, f64, f64)> {
-    let sin_max = libm::sin(region.theta_max_rad);
-    let scale = |(low, high): (f64, f64), t: f64| low + (high - low) * 0.5 * (1.0 + t);
-    let (positions, polar) = (position_nodes(), gauss_legendre(THETA_NODES));
-    let mut pairs = Vec::new();
-    // Place by place: what is the same into all directions is then known from the last.
-    for (tx, weight_x) in &positions {
-        for (ty, weight_y) in &positions {
-            let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
-            for (t, weight_theta) in &polar {
-                let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin_max * sin_max), *t)));
-                for k in 0..PHI_NODES {
-                    let turn = (f64::from(k) + 0.5) / f64::from(PHI_NODES);
-                    let phi_rad = (2.0 * turn - 1.0) * core::f64::consts::PI;
-                    let ray = Ray { x_m, y_m, theta_rad, phi_rad };
-                    let weight = weight_theta * weight_x * weight_y;
-                    pairs.push((weight, fitted(&ray), truth(&ray)));
-                }
-            }
-        }
-    }
-    pairs
-}
-
-/// Nodes in [-1, 1] and their weights.
-fn position_nodes() -> Vec<(f64, f64)> {
-    let part = 2.0 / f64::from(POSITION_PARTS);
-    let nodes = gauss_legendre(POSITION_NODES);
-    let in_part = |i: u32| {
-        let low = f64::from(i) * part - 1.0;
-        nodes.iter().map(move |(t, weight)| (low + part * 0.5 * (1.0 + t), part * 0.5 * weight))
-    };
-    (0..POSITION_PARTS).flat_map(in_part).collect()
 }
 
 #[cfg(test)]
