@@ -59,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Frontier(args) => frontier::frontier(&args),
         Command::Study { study: Study::Coverage(args) } => study::coverage(&args),
+        Command::Study { study: Study::Cost(args) } => study::cost(&args),
         Command::Resume(args) => resume::resume(&args),
         Command::Home(args) => hand::home(&args),
         Command::Jog(args) => hand::jog(&args),

@@ -9,6 +9,7 @@
 mod accuracy;
 mod atomic;
 mod charted;
+mod cost;
 mod coverage;
 mod derived;
 mod document;
@@ -30,6 +31,7 @@ mod treatment;
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
 pub use charted::{Charted, charted};
+pub use cost::{write_cost, write_reached};
 pub use coverage::write_coverage;
 pub use derived::{DerivedKind, DerivedOutcome, DerivedQuantity, DerivedTable};
 pub use document::with_section;

@@ -16,7 +16,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use chart::ChartArgs;
 pub(crate) use fit::FitArgs;
-pub(crate) use study::{CoverageArgs, FrontierArgs, Study};
+pub(crate) use study::{CostArgs, CoverageArgs, DocumentArgs, FrontierArgs, Study};
 
 /// Controller for goniometer and spherical-gantry measurement rigs.
 ///
@@ -59,7 +59,8 @@ pub(crate) enum Command {
     ///
     /// Example: gonio frontier examples/lambertian/plan.toml --out frontier
     Frontier(FrontierArgs),
-    /// Answer what only many runs can: whether stated uncertainties cover the truth.
+    /// Answer what only many runs can: whether stated uncertainties cover the truth, and what accuracy
+    /// costs in rig time.
     ///
     /// Example: gonio study coverage --short
     Study {

@@ -53,6 +53,12 @@ pub(crate) enum Study {
     /// Runs scenes drawn at random on the simulated rig. Exit code 1 where a demand is not met.
     /// Example: gonio study coverage --runs 1000 --out coverage
     Coverage(CoverageArgs),
+    /// What accuracy costs in rig time: rasters at rest and in flight, interpolated and fitted.
+    ///
+    /// Climbs a ladder of plans for each scene and strategy until the radiance and the exitance are
+    /// right to 1 and 0.3 %, on the simulated rig in virtual time. An hour and more for all.
+    /// Example: gonio study cost --scenes gloss --seeds 2 --quoted-seeds 2 --cache runs
+    Cost(CostArgs),
 }
 
 #[derive(Debug, Args)]
@@ -75,6 +81,16 @@ pub(crate) struct CoverageArgs {
     /// The folder for coverage.csv and coverage.svg; must not be there yet. Default: coverage-UTC.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) document: DocumentArgs,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Where a study writes what it found for people.
+#[derive(Debug, Args)]
+pub(crate) struct DocumentArgs {
     /// Replace the study's section in a Markdown document, or add it.
     #[arg(long, value_name = "FILE")]
     pub(crate) doc: Option<PathBuf>,
@@ -84,9 +100,48 @@ pub(crate) struct CoverageArgs {
     /// Where the document's figure goes. With --doc.
     #[arg(long, value_name = "FILE", requires = "doc")]
     pub(crate) figure: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CostArgs {
+    /// Scenes, by name, with commas between. Default: all.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) scenes: Vec<String>,
+    /// Strategies, by name, with commas between. Default: all.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) strategies: Vec<String>,
+    /// How many seeds each rung is tried with, from 1 upwards. Default: 5.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) seeds: Option<u64>,
+    /// How many seeds a rung is run with that met a target. Default: 20.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) quoted_seeds: Option<u64>,
+    /// Two rungs of one scene with one seed: seconds.
+    #[arg(long)]
+    pub(crate) short: bool,
+    /// Rungs that take the rig longer than this are left out, seconds.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) longest: Option<f64>,
+    /// The same for fits alone, whose choice of a basis takes the processor longest, seconds.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) longest_fit: Option<f64>,
+    /// A folder where runs are kept and found again by plan, rig, scene, seed, strategy and the
+    /// program's version. Take another one after the program itself was changed.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+    /// The folder for cost.csv, reached.csv and cost.svg; must not be there yet. Default: cost-UTC.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) document: DocumentArgs,
     /// Print one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
+    seconds.ok_or_else(|| "expected a number of seconds above 0".to_owned())
 }
 
 fn strategy(text: &str) -> Result<Strategy, String> {

@@ -4,13 +4,11 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use indicatif::{ProgressBar, ProgressDrawTarget};
 use radiometry::quadrature::gauss_legendre;
 
 use super::document::{Document, section, summary};
+use super::parallel::in_parallel;
 use crate::cli::acquire::{Acquired, Pace, acquire};
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
@@ -30,8 +28,10 @@ use crate::study::coverage::{
     demands, tally, targets,
 };
 
+/// The section's marks in the document, with pinned plans and with such as leave the basis open.
+const NAMES: [&str; 2] = ["coverage", "coverage-unpinned"];
 /// Of a real lamp; CC0 as its notice beside it says.
-const PHOTOMETRIC: &str = include_str!("../../../examples/luminaire/ushio_b1.ies");
+pub(super) const PHOTOMETRIC: &str = include_str!("../../../examples/luminaire/ushio_b1.ies");
 /// Runs a scene of the short study.
 const SHORT_RUNS: usize = 12;
 /// Scenes of the short study: one that the basis follows, one that it does not.
@@ -62,7 +62,7 @@ struct Entry {
 
 /// Makes the runs, writes what they say, and answers whether every demand was met.
 pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
-    let document = Document::asked(args)?;
+    let document = Document::asked(&args.document, NAMES[usize::from(args.unpinned)])?;
     let families = families(args)?;
     let runs = args.runs.unwrap_or(if args.short { SHORT_RUNS } else { 1000 });
     let folder =
@@ -191,34 +191,6 @@ fn pools_of(family: Option<Family>, scale: Scale, parts: &[(Vec<Target>, Vec<Run
         Pool { family, scale, kind, runs, tally: tally(scores) }
     };
     if runs == 0 { Vec::new() } else { Kind::ALL.into_iter().map(pool).collect() }
-}
-
-/// Answers in the entries' order; `None` where a thread came to grief.
-fn in_parallel<T: Send>(entries: &[Entry], one: impl Fn(&Entry) -> T + Sync) -> Vec<Option<T>> {
-    let bar = ProgressBar::with_draw_target(
-        Some(entries.len() as u64),
-        ProgressDrawTarget::stderr_with_hz(5),
-    );
-    let next = AtomicUsize::new(0);
-    let slots: Vec<Mutex<Option<T>>> = entries.iter().map(|_| Mutex::new(None)).collect();
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(entries.len()) {
-            scope.spawn(|| {
-                loop {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(entry) = entries.get(place) else { break };
-                    let answer = one(entry);
-                    bar.inc(1);
-                    if let Ok(mut slot) = slots[place].lock() {
-                        *slot = Some(answer);
-                    }
-                }
-            });
-        }
-    });
-    bar.finish_and_clear();
-    slots.into_iter().map(|slot| slot.into_inner().ok().flatten()).collect()
 }
 
 /// One run of a scene as drawn, from the wire to the scores.

@@ -7,14 +7,11 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::coverage::Studied;
-use crate::cli::args::CoverageArgs;
+use crate::cli::args::DocumentArgs;
 use crate::cli::failure::Failure;
 use crate::cli::text::table;
 use crate::export::{with_section, write_atomically};
 use crate::study::coverage::{Demand, Family, Pool};
-
-/// The section's marks in the document, with pinned plans and with such as leave the basis open.
-const NAMES: [&str; 2] = ["coverage", "coverage-unpinned"];
 
 /// The document that a section goes to.
 pub(super) struct Document {
@@ -26,7 +23,7 @@ pub(super) struct Document {
 
 impl Document {
     /// What the command line asks for; refused before a study of hours has begun.
-    pub(super) fn asked(args: &CoverageArgs) -> Result<Option<Self>, Failure> {
+    pub(super) fn asked(args: &DocumentArgs, name: &'static str) -> Result<Option<Self>, Failure> {
         let Some(path) = args.doc.clone() else { return Ok(None) };
         let Some(date) = args.date.clone() else {
             return Err(Failure::with_help(
@@ -34,7 +31,6 @@ impl Document {
                 "add it, for example --date 2026-11-22",
             ));
         };
-        let name = NAMES[usize::from(args.unpinned)];
         Ok(Some(Self { path, date, figure: args.figure.clone(), name }))
     }
 
@@ -56,11 +52,16 @@ impl Document {
         Ok(())
     }
 
+    /// The day.
+    pub(super) fn date(&self) -> &str {
+        &self.date
+    }
+
     /// The figure as the document refers to it, if it lies below its folder.
-    fn reference(&self) -> Option<String> {
+    pub(super) fn reference(&self, words: &str) -> Option<String> {
         let figure = self.figure.as_ref()?;
         let below = self.path.parent().and_then(|folder| figure.strip_prefix(folder).ok());
-        Some(format!("![Coverage by cell]({})", below.unwrap_or(figure).display()))
+        Some(format!("![{words}]({})", below.unwrap_or(figure).display()))
     }
 }
 
@@ -144,7 +145,7 @@ pub(super) fn section(studied: &Studied, demands: &[Demand], document: &Document
     for pool in &studied.pools {
         let _ = writeln!(text, "| {} |", cells_of(pool).join(" | "));
     }
-    if let Some(reference) = document.reference() {
+    if let Some(reference) = document.reference("Coverage by cell") {
         let _ = writeln!(text, "\n{reference}");
     }
     let met = demands.iter().filter(|demand| demand.is_met).count();
@@ -159,7 +160,7 @@ pub(super) fn section(studied: &Studied, demands: &[Demand], document: &Document
         text,
         "\n`gonio study coverage --scenes {} --runs {runs} --seed {seed}{flag}`  \n{}",
         names.join(","),
-        document.date
+        document.date()
     );
     text
 }

@@ -1,6 +1,9 @@
 //! `gonio study`: questions to which only many runs have an answer.
 
+mod cost;
 mod coverage;
 mod document;
+mod parallel;
 
+pub(crate) use cost::cost;
 pub(crate) use coverage::coverage;

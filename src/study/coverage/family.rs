@@ -196,7 +196,7 @@ fn off_axis(draws: &mut Draws, level: f64) -> String {
 
 /// A grey image of one row, from 1 - 2 slope on its left to 1 + 2 slope on its right: at the region's
 /// ends a sixth of that. Finer than any footprint.
-fn ramp(slope: f64) -> Vec<u8> {
+pub(in crate::study) fn ramp(slope: f64) -> Vec<u8> {
     // The middle of the region, and the places aside that are asked for, then lie in the middle of
     // a column: what is asked of a staircase is its slope.
     let columns = 4099;
@@ -211,7 +211,7 @@ fn ramp(slope: f64) -> Vec<u8> {
 
 /// A file in LM-63, its intensities such that the patch of [`OUTLINE`] has about this radiance along
 /// its normal: by the multiplier, the third number after the tilt.
-fn scaled(file: &str, level: f64) -> String {
+pub(in crate::study) fn scaled(file: &str, level: f64) -> String {
     let Some((head, tail)) = file.split_once("TILT=NONE") else { return file.to_owned() };
     let tail = tail.trim_start();
     let (numbers, rest) = tail.split_once('\n').unwrap_or((tail, ""));

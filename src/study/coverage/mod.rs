@@ -12,4 +12,5 @@ pub use band::{binomial_band, rms_band};
 pub use demand::{Cell, Demand, Pool, SENSITIVE_RUNS, Tally, demands, tally};
 pub use draws::Draws;
 pub use family::{Attachment, Drawn, FAMILIES, Family, Scale};
+pub(super) use family::{ramp, scaled};
 pub use target::{Kind, Run, Score, Target, targets};
