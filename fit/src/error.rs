@@ -152,6 +152,11 @@ pub enum FitError {
         /// What is missing.
         missing: &'static str,
     },
+    /// A fit whose readings can't be drawn again.
+    Trials {
+        /// What is missing.
+        missing: &'static str,
+    },
     /// The numbers are so large or so small that squares leave the range of f64.
     OutOfRange,
     /// Stored parts of a fit don't belong together.
@@ -239,6 +244,9 @@ impl fmt::Display for FitError {
                 one_pose(f, *readings, theta_rad.to_degrees(), phi_rad.to_degrees())
             }
             Self::Nuisance { name, missing } => write!(f, "{name} can't be fitted: {missing}"),
+            Self::Trials { missing } => {
+                write!(f, "no trials of this fit's readings: {missing} are not at hand")
+            }
             Self::OutOfRange => f.write_str("values or variances leave the range of numbers"),
             Self::Parts { what, expected, found } => {
                 write!(f, "stored fit: {what}: expected {expected} finite numbers, found {found}")

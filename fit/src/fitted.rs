@@ -5,8 +5,9 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
+use crate::measured::Measured;
 use crate::{
-    BasisSpec, BeamRows, FitError, Functional, Influence, Penalised, Penalty, Ray, Region,
+    BasisSpec, BeamRows, Cause, FitError, Functional, Influence, Penalised, Penalty, Ray, Region,
     Truncation, Weighed, sparse,
 };
 use radiometry::DomainError;
@@ -102,6 +103,7 @@ pub struct Fit {
     weighed: Option<Weighed>,
     /// Of a fit in many local functions, instead of the parts' factor.
     sparse: Option<Arc<sparse::Factor>>,
+    measured: Option<Measured>,
 }
 
 impl Fit {
@@ -120,7 +122,7 @@ impl Fit {
             demand("shift", p, &common.shift)?;
         }
         let beyond = parts.truncation.as_ref().map(|t| beyond(t, p, parts.region)).transpose()?;
-        Ok(Self { basis, beyond, parts, influence: None, weighed: None, sparse: None })
+        Ok(Self { basis, beyond, parts, influence: None, weighed: None, measured: None, sparse: None })
     }
 
     /// Of parts without a factor, whose covariance is the inverse of what a sparse one stands for.
@@ -134,7 +136,7 @@ impl Fit {
             demand("shift", basis.len(), &common.shift)?;
         }
         let sparse = Some(factor);
-        Ok(Self { basis, beyond: None, parts, influence: None, weighed: None, sparse })
+        Ok(Self { basis, beyond: None, parts, influence: None, weighed: None, measured: None, sparse })
     }
 
     /// Whether the fit is one in so many local functions that its covariance is not kept as a matrix:
@@ -149,6 +151,49 @@ impl Fit {
 
     pub(crate) fn with_weighed(self, weighed: Weighed) -> Self {
         Self { weighed: Some(weighed), ..self }
+    }
+
+    pub(crate) fn with_measured(self, measured: Option<Measured>) -> Self {
+        Self { measured, ..self }
+    }
+
+    /// Where the samples lay; `None` of a fit that was stored and taken up again, or read in blocks.
+    pub(crate) fn measured(&self) -> Option<&Measured> {
+        self.measured.as_ref()
+    }
+
+    /// That the meridians are too few for the functions, if so: each coefficient is determined, but
+    /// what varies more often around the normal than the meridians can tell stands against other
+    /// functions by its course in θ alone. `None` too where it isn't known where the samples lay.
+    pub fn aliased(&self) -> Option<Cause> {
+        self.measured.as_ref()?.too_few_meridians(&self.basis)
+    }
+
+    /// Whether something was measured along the ray: the region covers it, and it lies in no gap
+    /// of the directions, where those are known.
+    pub fn is_measured(&self, ray: &Ray) -> bool {
+        self.region().covers(ray) && self.is_in_no_gap(ray.theta_rad, ray.phi_rad)
+    }
+
+    pub(crate) fn is_in_no_gap(&self, theta_rad: f64, phi_rad: f64) -> bool {
+        let holds = |measured: &Measured| measured.holds(theta_rad, phi_rad, self.region());
+        self.measured.as_ref().is_none_or(holds)
+    }
+
+    /// Other coefficients in the same basis, with the noise of these and nothing else.
+    pub(crate) fn bare(&self, coefficients: Vec<f64>) -> Self {
+        let Parts { region, model, factor, quality, .. } = &self.parts;
+        let parts = Parts {
+            region: *region,
+            model: *model,
+            coefficients,
+            factor: factor.clone(),
+            shifts: Vec::new(),
+            quality: *quality,
+            truncation: None,
+        };
+        let (beyond, influence, weighed) = (None, None, None);
+        Self { basis: self.basis.clone(), beyond, parts, influence, weighed, measured: None }
     }
 
     /// The same fit with other coefficients in the same basis.
@@ -201,7 +246,7 @@ impl Fit {
     /// In charts other than the surface one it is no exitance but the flux over the region's area,
     /// or at the point of an environment the spherical irradiance ∫ L dω.
     pub fn exitance(&self) -> Estimate {
-        self.estimate(&self.exitance_functional())
+        self.estimate(&self.exitance_sum())
     }
 
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
@@ -235,16 +280,33 @@ impl Fit {
         mean.times(self.region().area_m2() * projection)
     }
 
-    /// The exitance within the region's cone over that of the hemisphere: how much of the latter
-    /// rests on measurement. `None` where the exitance isn't positive.
+    /// The exitance from directions that were measured over that of the hemisphere: how much of the
+    /// latter rests on measurement. Measured is what lies within the region's cone and, where it is
+    /// known where the samples lay, within the reach of their own mesh ([`Coverage`](crate::Coverage)):
+    /// an even grid has no gaps, however sparse up to 26° from reading to mesh, a wedge of azimuth that was left out is
+    /// one, to about two degrees. `None` where the exitance isn't positive.
     pub fn measured_fraction(&self) -> Option<f64> {
         let whole = self.exitance().value;
-        (whole > 0.0).then(|| self.exitance_within_region().value / whole)
+        let within = self.exitance_within_region().value - self.exitance_from_gaps();
+        (whole > 0.0).then(|| within / whole)
+    }
+
+    /// What comes from gaps within the region's cone.
+    fn exitance_from_gaps(&self) -> f64 {
+        let Some(measured) = &self.measured else { return 0.0 };
+        let is_whole = self.region().chart.is_whole_sphere();
+        let (gaps, solid_angle_sr) = measured.gaps(self.region());
+        let one = |(theta_rad, phi_rad): (f64, f64)| {
+            let projection = if is_whole { 1.0 } else { libm::cos(theta_rad) };
+            let mean = self.basis.mean_over_region(theta_rad, phi_rad);
+            projection * dot(&mean, &self.parts.coefficients)
+        };
+        solid_angle_sr * gaps.into_iter().map(one).sum::<f64>()
     }
 
     /// The exitance's uncertainty by source, the independent part first.
     pub fn contributions(&self) -> Vec<Contribution> {
-        self.budget(&self.exitance_functional())
+        self.budget(&self.exitance_sum())
     }
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.
@@ -355,13 +417,14 @@ impl Fit {
         &self.basis
     }
 
+    /// The functions beyond the fit's own, where it knows what it misses.
+    pub(crate) fn beyond(&self) -> Option<&Basis> {
+        self.beyond.as_ref()
+    }
+
     /// The functional that a function makes of a basis.
     pub(crate) fn functional(&self, over: impl Fn(&Basis) -> Vec<f64>) -> Functional {
         Functional::new(over(&self.basis), self.beyond.as_ref().map(over).unwrap_or_default())
-    }
-
-    fn exitance_functional(&self) -> Functional {
-        self.functional(|basis| basis.exitance().to_vec())
     }
 
     fn radiance_functional(&self, ray: &Ray) -> Functional {

@@ -12,7 +12,9 @@
 use crate::readings::Fitted;
 use crate::triangle::{Solution, Triangle};
 use crate::{Common, FitError};
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
 use faer::{Mat, MatRef, Par, Side};
 
 /// A solution for the field, and the rows above it that say what the nuisances are then.
@@ -57,6 +59,21 @@ impl Solved {
         });
         solve_upper_triangular_in_place(self.own(), x.as_mut(), Par::Seq);
         (0..q).map(|i| x[(i, 0)]).collect()
+    }
+
+    /// What other readings make of the field's coefficients, a column for each set: of their products
+    /// with the rows, AᵀW^½ y, nuisances first, (RᵀR)⁻¹ times that.
+    pub(crate) fn refitted(&self, sides: Mat<f64>) -> Mat<f64> {
+        let (q, p) = (self.count, self.field.len());
+        let mut field = sides.as_ref().get(q.., ..).to_owned();
+        if q > 0 {
+            let mut own = sides.as_ref().get(..q, ..).to_owned();
+            solve_lower_triangular_in_place(self.own().transpose(), own.as_mut(), Par::Seq);
+            field -= self.rows.as_ref().get(.., q..q + p).transpose() * own;
+        }
+        solve_lower_triangular_in_place(self.field.r().transpose(), field.as_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.field.r(), field.as_mut(), Par::Seq);
+        field
     }
 
     /// With what is left of their uncertainty. `inverse` is S of the field's covariance S Sᵀ.

@@ -19,17 +19,22 @@ impl Fit {
     /// The largest radiance within the region and its cone. Where several are equal, the one
     /// nearest the normal.
     pub fn peak(&self) -> Peak {
-        let mut best: Option<(Place, f64)> = None;
-        for start in self.starts() {
-            let (place, value) = self.climb(start);
-            let margin = TIE_RELATIVE * value.abs();
-            if best.is_none_or(|(_, top)| value > top + margin) {
-                best = Some((place, value));
-            }
-        }
-        let place = best.map_or(Place::CENTRE, |(place, _)| place);
+        let climbed = self.starts().into_iter().map(|start| self.climb(start));
+        let place = highest(climbed).map_or(Place::CENTRE, |(place, _)| place);
         let ray = place.ray(self.region());
         Peak { radiance: self.radiance(&ray), ray }
+    }
+
+    /// The tops that the best places of the grid lead to, each once.
+    pub(crate) fn tops(&self) -> Vec<Top> {
+        let mut tops: Vec<Top> = Vec::new();
+        for start in self.starts() {
+            let place = self.climb(start).0;
+            if tops.iter().all(|top| top.0.distance(place) > TOPS_APART) {
+                tops.push(Top(place));
+            }
+        }
+        tops
     }
 
     /// The best places of the grid, a few of them so that a second lobe has its chance.
@@ -59,26 +64,35 @@ impl Fit {
         starts.into_iter().map(|(place, _)| place).collect()
     }
 
-    /// Steps along the axes while that rises, with ever smaller steps.
+    /// To the top that the fitted field has near a place.
     fn climb(&self, start: Place) -> (Place, f64) {
         let basis = self.functions();
         let mut scratch = basis.scratch();
+        let mut at = |ray: &Ray| basis.value(self.coefficients(), ray, &mut scratch);
+        self.climb_over(start, STEP_LAST, &mut at)
+    }
+
+    /// Steps along the axes while that rises, with ever smaller steps down to the last.
+    fn climb_over(
+        &self,
+        start: Place,
+        step_last: f64,
+        value_along: &mut impl FnMut(&Ray) -> f64,
+    ) -> (Place, f64) {
         let r_max = match self.region().chart {
             Chart::TwoPlane { .. } => core::f64::consts::SQRT_2,
             _ => disk_radius(self.region(), self.region().theta_max_rad),
         };
-        let mut at = |place: Place| {
-            basis.value(self.coefficients(), &place.ray(self.region()), &mut scratch)
-        };
+        let mut at = |place: Place| value_along(&place.ray(self.region()));
         let (mut place, mut value) = (start, at(start));
-        let mut step = STEP_FIRST / (basis.directions().fineness() + 1) as f64;
+        let mut step = STEP_FIRST / (self.functions().directions().fineness() + 1) as f64;
         for _ in 0..STEPS_MAX {
             let around = place.neighbours(step, r_max);
             let best = around.map(|place| (place, at(place)));
             let best = best.into_iter().fold((place, value), |a, b| if b.1 > a.1 { b } else { a });
             if best.1 > value + TIE_RELATIVE * value.abs() {
                 (place, value) = best;
-            } else if step < STEP_LAST {
+            } else if step < step_last {
                 break;
             } else {
                 step *= 0.5;
@@ -86,6 +100,26 @@ impl Fit {
         }
         (place, value)
     }
+}
+
+/// A place that a fitted field falls from to all sides.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Top(Place);
+
+/// The largest value of another field over the same region, climbed to from the tops of the fit's.
+pub(crate) fn along(fit: &Fit, tops: &[Top], value: &mut impl FnMut(&Ray) -> f64) -> (Ray, f64) {
+    let climbed = tops.iter().map(|top| fit.climb_over(top.0, STEP_LAST_ROUGH, value));
+    let (place, value) = highest(climbed).unwrap_or((Place::CENTRE, f64::NAN));
+    (place.ray(fit.region()), value)
+}
+
+/// Of equally high places the first.
+fn highest(places: impl Iterator<Item = (Place, f64)>) -> Option<(Place, f64)> {
+    places.fold(None, |best: Option<(Place, f64)>, (place, value)| {
+        let margin = TIE_RELATIVE * value.abs();
+        let is_higher = best.is_none_or(|(_, top)| value > top + margin);
+        if is_higher { Some((place, value)) } else { best }
+    })
 }
 
 /// A ray by its point on the Nusselt disk (of the whole sphere on the equal-area disk, half as far
@@ -100,6 +134,11 @@ struct Place {
 
 impl Place {
     const CENTRE: Self = Self { u: 0.0, v: 0.0, a: 0.0, b: 0.0 };
+
+    fn distance(self, other: Self) -> f64 {
+        let across = libm::hypot(self.u - other.u, self.v - other.v);
+        libm::hypot(across, libm::hypot(self.a - other.a, self.b - other.b))
+    }
 
     fn ray(self, region: &Region) -> Ray {
         let between = |t: f64, (from, to): (f64, f64)| 0.5 * ((1.0 - t) * from + (1.0 + t) * to);
@@ -208,6 +247,10 @@ const STARTS: usize = 6;
 const STEP_FIRST: f64 = 0.5;
 /// The search ends at this step on the unit disk: 3e-5 degrees.
 const STEP_LAST: f64 = 5e-7;
+/// And where many searches are made at this: a thousandth of a degree.
+const STEP_LAST_ROUGH: f64 = 1e-5;
+/// Searches that end closer than this came to the same top.
+const TOPS_APART: f64 = 1e-3;
 /// Most steps of one search.
 const STEPS_MAX: usize = 400;
 /// Values closer than this are equal: rounding must not choose the place.

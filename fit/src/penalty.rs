@@ -96,6 +96,11 @@ impl Prior {
         self.rows.is_none()
     }
 
+    /// The penalty's rows: readings of zero with u = 1.
+    pub(crate) fn held(&self) -> Option<&Mat<f64>> {
+        self.rows.as_ref()
+    }
+
     /// Takes the penalty's rows in, with zeros for the right-hand sides.
     pub(crate) fn absorb_into(&self, triangle: &mut Triangle, sides: usize) {
         let Some(rows) = &self.rows else { return };

@@ -10,6 +10,7 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check;
 use crate::fitted::{CommonShift, Fit, Parts, Quality};
+use crate::measured::Measured;
 use crate::nuisance::{Solved, packed, without};
 use crate::penalty::{Penalised, Prior};
 use crate::readings::{Readings, Weighed};
@@ -133,6 +134,7 @@ pub fn fit_readings(
     let truncation = None;
     Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality, truncation })
         .map(|fit| fit.with_influence(influence).with_weighed(weighed))
+        .map(|fit| fit.with_measured(Some(Measured::of(samples))))
         .map_err(|_| FitError::OutOfRange)
 }
 

@@ -119,7 +119,7 @@ impl Symmetry {
 
     /// Images of a ray that the field shall be the same along. A field that is the same turned by a
     /// radian, again and again, is the same under any turn.
-    fn images(self, ray: &Ray, region: &Region) -> Vec<Ray> {
+    pub(crate) fn images(self, ray: &Ray, region: &Region) -> Vec<Ray> {
         let middle = |(from, to): (f64, f64)| 0.5 * (from + to);
         let (cx, cy) = (middle(region.x_m), middle(region.y_m));
         let (x, y) = (ray.x_m - cx, ray.y_m - cy);
@@ -212,7 +212,8 @@ impl Fit {
             quality,
             ..self.parts().clone()
         };
-        Ok((self.with_parts(parts), test))
+        let measured = self.measured().and_then(|all| all.under(symmetry, self.region()));
+        Ok((self.with_parts(parts).with_measured(measured), test))
     }
 
     fn factor_matrix(&self) -> Mat<f64> {

@@ -39,6 +39,16 @@ pub enum Cause {
         /// Degree of the basis in direction: one more is needed.
         degree: usize,
     },
+    /// Too few meridians, φ and φ + 180° being two: what varies as the degree does around the normal
+    /// looks on them like what varies more slowly.
+    Meridians {
+        /// Distinct meridians found.
+        distinct: usize,
+        /// Degree of the basis in direction.
+        degree: usize,
+        /// Distinct meridians that the degree needs.
+        needed: usize,
+    },
     /// Too few distinct angles from the normal.
     Polar {
         /// Distinct angles found.
@@ -89,6 +99,13 @@ impl fmt::Display for Cause {
                 "only {distinct} distinct azimuth lines (phi and phi + 180° count as one): degree \
                  {degree} needs {}",
                 degree + 1
+            ),
+            Self::Meridians { distinct, degree, needed } => write!(
+                f,
+                "only {distinct} meridian{} (phi and phi + 180° count as two): what varies {degree} \
+                 times around the normal needs {needed}, and is told from slower changes by its course \
+                 in theta alone",
+                plural(*distinct)
             ),
             Self::Polar { distinct, degree, needed } => write!(
                 f,

@@ -6,7 +6,8 @@
 
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, SQRT_2, TAU};
 
-use super::coverage::Coverage;
+use fit::Coverage;
+
 use super::raster::{self, Cell, Frame};
 use super::svg::{Anchor, Picture, Svg, marks, px};
 use super::ticks::significant;

@@ -4,7 +4,6 @@
 mod bars;
 mod chart;
 mod colour;
-mod coverage;
 mod frontier;
 mod hemisphere;
 mod page;

@@ -5,7 +5,8 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use super::coverage::Coverage;
+use fit::Coverage;
+
 use super::svg::{Anchor, Picture, Svg, marks, polyline};
 use super::ticks::Ticks;
 

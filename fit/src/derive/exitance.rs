@@ -85,6 +85,7 @@ impl Field<'_> {
         let flux = self.fit.throughput_sum();
         Ok(Derived {
             measured_fraction: Some(1.0),
+            functional: Some(flux.clone()),
             ..self.first_order(self.fit.of(&flux).value, &flux, |_| None)
         })
     }

@@ -1,7 +1,7 @@
 //! Many radiances at once, each with its u: the environment that the sample makes for a point, and
 //! the light field between two planes.
 
-use super::sum::{Node, is_measured};
+use super::sum::Node;
 use super::{DeriveError, Field};
 use crate::{Chart, Estimate, Ray, Region};
 use glam::DVec3;
@@ -147,7 +147,7 @@ impl Field<'_> {
                 towards,
                 solid_angle_sr: (upper - lower) * step_rad,
                 covered: 1.0,
-                measured: f64::from(u8::from(is_measured(self.fit, &ray))),
+                measured: f64::from(u8::from(self.fit.is_measured(&ray))),
                 radiance: self.fit.radiance(&ray),
             }
         };
@@ -181,9 +181,8 @@ impl Field<'_> {
             self.leaving(map.place_m, towards(theta_rad, phi_rad))
         });
         let rays: Vec<Ray> = rays.collect();
-        let is_known = |ray: &&Ray| {
-            self.medium.seen(ray).is_some_and(|(seen, _)| is_measured(self.fit, &seen))
-        };
+        let is_known =
+            |ray: &&Ray| self.medium.seen(ray).is_some_and(|(seen, _)| self.fit.is_measured(&seen));
         let known = rays.iter().filter(is_known).count();
         let terms: Vec<(Node, f64)> = rays.iter().map(|ray| (Node::Along(*ray), part)).collect();
         EnvironmentCell {
@@ -253,7 +252,7 @@ impl Field<'_> {
         Some(TwoPlaneRay {
             place,
             ray,
-            is_measured: seen.is_some_and(|(seen, _)| is_measured(self.fit, &seen)),
+            is_measured: seen.is_some_and(|(seen, _)| self.fit.is_measured(&seen)),
             radiance: seen.map(|_| self.estimate(&[(Node::Along(ray), 1.0)])),
         })
     }

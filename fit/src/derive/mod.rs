@@ -35,7 +35,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::{Chart, Contribution, Estimate, Fit};
+use crate::{Chart, Contribution, Estimate, Fit, Functional};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 pub use arriving::PointReceiver;
@@ -84,6 +84,9 @@ pub struct Derived {
     /// How much of the value comes along rays within the region and its cone, that is from where
     /// something was measured; `None` where the value isn't a positive sum over rays.
     pub measured_fraction: Option<f64>,
+    /// What it is of the fit's coefficients, where it is linear in them and no layer's number has a
+    /// part in its u.
+    pub functional: Option<Functional>,
     /// How far the quadrature may be off, by its change at the last refinement; in the value's
     /// unit. Not part of u.
     pub quadrature_bound: f64,

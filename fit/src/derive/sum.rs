@@ -3,7 +3,7 @@
 
 use super::medium::Medium;
 use super::{DeriveError, Derived, Field, Remark};
-use crate::{Contribution, Estimate, Fit, Functional, Ray, Region};
+use crate::{Contribution, Estimate, Functional, Ray, Region};
 use radiometry::quadrature::gauss_legendre;
 
 /// A term of a sum.
@@ -58,7 +58,8 @@ impl Field<'_> {
                 (Node::Along(ray), _) => rays.push((ray, weight)),
                 (Node::Towards { theta_rad, phi_rad }, Medium::Air) => {
                     let part = self.fit.mean_towards(theta_rad, phi_rad);
-                    let is_inside = theta_rad <= self.fit.region().theta_max_rad + ROUNDING_RAD;
+                    let is_inside = theta_rad <= self.fit.region().theta_max_rad + ROUNDING_RAD
+                        && self.fit.is_in_no_gap(theta_rad, phi_rad);
                     let side = if is_inside { &mut sum.inside } else { &mut sum.outside };
                     side.add(weight, &part);
                 }
@@ -88,7 +89,7 @@ impl Field<'_> {
                 sum.lost += 1;
                 continue;
             };
-            let side = if is_measured(self.fit, &seen) { &mut inside } else { &mut outside };
+            let side = if self.fit.is_measured(&seen) { &mut inside } else { &mut outside };
             side.push((seen, weight * factor));
         }
         for (side, rays) in [(&mut sum.inside, inside), (&mut sum.outside, outside)] {
@@ -154,6 +155,7 @@ impl Field<'_> {
             estimate: self.fit.of(&whole),
             budget: self.fit.contributions_of(&whole),
             measured_fraction: (value > 0.0).then(|| inside / value),
+            functional: (self.medium == Medium::Air).then_some(whole),
             quadrature_bound: bound,
             remarks,
         }
@@ -184,6 +186,7 @@ impl Field<'_> {
             estimate: Estimate { value, ..self.fit.of(functional) },
             budget: self.fit.contributions_of(functional),
             measured_fraction: None,
+            functional: None,
             quadrature_bound: 0.0,
             remarks: Vec::new(),
         }
@@ -205,11 +208,6 @@ impl Derived {
         self.estimate.u = variance.sqrt();
         self
     }
-}
-
-/// Whether something was measured about the ray: within the region's rectangle and its cone.
-pub(super) fn is_measured(fit: &Fit, ray: &Ray) -> bool {
-    fit.region().covers(ray)
 }
 
 /// Places over the region with their shares, by Gauss-Legendre; one along a side without length.

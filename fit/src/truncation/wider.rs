@@ -227,7 +227,8 @@ impl Wider<'_> {
         if is_wider {
             parts.model.truncation = rough;
         }
-        let mut wider = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
+        let wider = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
+        let mut wider = wider.with_measured(fit.measured().cloned());
         if let Some(influence) = influence {
             wider = wider.with_influence(influence);
         }

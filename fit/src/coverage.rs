@@ -21,9 +21,9 @@ const REACH_RAD: (f64, f64) = (0.02, 0.45);
 /// A readback is never exactly the direction asked for.
 const RIM_MARGIN_RAD: f64 = 0.005;
 
-/// The directions of readings.
+/// The directions of readings, and how far each counts.
 #[derive(Debug, Clone)]
-pub(super) struct Coverage {
+pub struct Coverage {
     units: Vec<[f64; 3]>,
     reach_rad: f64,
     theta_max_rad: f64,
@@ -31,7 +31,7 @@ pub(super) struct Coverage {
 
 impl Coverage {
     /// Of directions (θ, φ), radians.
-    pub(super) fn of(directions: &[(f64, f64)]) -> Self {
+    pub fn of(directions: &[(f64, f64)]) -> Self {
         let theta_max_rad = directions.iter().map(|(theta, _)| *theta).fold(0.0, f64::max);
         let units = distinct(directions);
         let theta_max_rad = (theta_max_rad + RIM_MARGIN_RAD).min(core::f64::consts::FRAC_PI_2);
@@ -39,24 +39,29 @@ impl Coverage {
     }
 
     /// Whether something was measured there or nearby.
-    pub(super) fn holds(&self, theta_rad: f64, phi_rad: f64) -> bool {
+    pub fn holds(&self, theta_rad: f64, phi_rad: f64) -> bool {
+        theta_rad <= self.theta_max_rad && self.reaches(theta_rad, phi_rad)
+    }
+
+    /// Whether a reading counts as far as there, beyond the largest θ that was read too.
+    pub fn reaches(&self, theta_rad: f64, phi_rad: f64) -> bool {
         let unit = unit(theta_rad, phi_rad);
         let cos_reach = libm::cos(self.reach_rad);
-        theta_rad <= self.theta_max_rad && self.units.iter().any(|u| dot(u, &unit) >= cos_reach)
+        self.units.iter().any(|u| dot(u, &unit) >= cos_reach)
     }
 
     /// The directions, each once: unit vectors.
-    pub(super) fn units(&self) -> &[[f64; 3]] {
+    pub fn units(&self) -> &[[f64; 3]] {
         &self.units
     }
 
     /// Beyond this angle nothing was measured, radians; at most π/2.
-    pub(super) fn theta_max_rad(&self) -> f64 {
+    pub fn theta_max_rad(&self) -> f64 {
         self.theta_max_rad
     }
 
     /// How far a reading counts, radians.
-    pub(super) fn reach_rad(&self) -> f64 {
+    pub fn reach_rad(&self) -> f64 {
         self.reach_rad
     }
 }
