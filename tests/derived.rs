@@ -208,3 +208,80 @@ fn requests_that_mean_nothing_are_refused_at_their_place() {
     let bench = bench.having("w.toml", "[derived]\n");
     bench.gonio(&["fit", "s.csv", "--derive", "w.toml"]).refused(&["w.toml:1:", "`derive`"]);
 }
+
+#[test]
+fn trials_agree_with_u_where_all_is_linear_and_repeat_by_their_seed() {
+    let bench = bench();
+    let run = |seed: &str| {
+        let arguments = [
+            "fit",
+            "s.csv",
+            "--json",
+            "--angular-degree",
+            "2",
+            "--u-scale",
+            "0.002",
+            "--monte-carlo",
+            "2000",
+            "--seed",
+            seed,
+            "--derive",
+            "beam_angle c_deg=0",
+            "--derive",
+            "irradiance at_mm=0,0,100 normal=0,0,-1",
+            "-o",
+            "fit.json",
+        ];
+        bench.gonio(&arguments).well().json()
+    };
+    let fit = run("5");
+    assert_eq!(fit["monte_carlo"], bench.json("fit.json")["monte_carlo"]);
+    assert_eq!(fit["monte_carlo"], run("5")["monte_carlo"]);
+    assert_ne!(fit["monte_carlo"], run("6")["monte_carlo"]);
+    assert_eq!(fit["monte_carlo"]["trials"], 2000);
+    let numbers = fit["monte_carlo"]["numbers"].as_array().unwrap();
+    let names: Vec<&str> = numbers.iter().filter_map(|number| number["name"].as_str()).collect();
+    let expected = [
+        "exitance",
+        "flux",
+        "intensity_along_normal",
+        "radiance_along_peak_ray",
+        "peak_radiance",
+        "beam_angle-C0-C180",
+        "irradiance-2",
+    ];
+    assert_eq!(names, expected);
+    for one in numbers {
+        let of = |path: &str| number(one, path);
+        // The u of 2000 trials is known to 1.6 %.
+        let ratio = of("/trials/u") / of("/linear/u");
+        assert!((0.92..1.08).contains(&ratio) || one["name"] == "peak_radiance", "{one}");
+        assert!(of("/trials/interval_95/0") < of("/trials/mean"));
+        assert!(of("/trials/interval_95/1") > of("/trials/mean"));
+        let width = |key: &str| of(&format!("{key}/1")) - of(&format!("{key}/0"));
+        assert!(width("/trials/shortest_95") <= width("/trials/interval_95"), "{one}");
+    }
+    // The largest of noisy values lies above the field's.
+    let (peak, along) = (&numbers[4], &numbers[3]);
+    assert!(number(peak, "/trials/mean") > number(along, "/trials/mean"));
+    assert!(number(&fit, "/monte_carlo/peak_direction/within_95_deg") > 1.0);
+    let text =
+        bench.gonio(&["fit", "s.csv", "--monte-carlo", "200", "--angular-degree", "2"]).well();
+    assert!(text.out.contains("200 trials, seed 1"), "{}", text.out);
+}
+
+#[test]
+fn trials_that_make_no_sense_are_refused() {
+    let bench = bench();
+    let refused = |arguments: &[&str], needle: &str| {
+        let said = bench.gonio(&[&["fit", "s.csv"], arguments].concat());
+        assert_eq!(said.code, Some(2), "{}", said.err);
+        assert!(said.err.contains(needle), "{}", said.err);
+    };
+    refused(&["--monte-carlo", "99"], "99 trials; expected 100 to 1000000");
+    refused(&["--monte-carlo", "1000001"], "expected 100 to 1000000");
+    refused(&["--monte-carlo", "many"], "invalid value");
+    refused(&["--seed", "3"], "--monte-carlo");
+    let symmetric = ["--monte-carlo", "100", "--symmetry", "rotational", "--angular-degree", "2"];
+    refused(&symmetric, "plain least squares");
+}

@@ -12,19 +12,22 @@ use super::args::FitArgs;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
+use super::monte_carlo::{self, Dice};
 use super::output::{note, say, write_out};
 use super::partial;
 use super::picture;
-use super::results::{Results, read_run};
-use super::setup::rig_at;
+use super::results::{Results, optics, read_run};
+use super::setup::{Setup, rig_at};
 use super::stream::{self, Scan};
 use super::summary::{field_rows, model_rows, treatment_rows};
 use super::text::{row, table};
 use crate::export::{
-    FitFile, InputSample, ListedRay, RayChart, Treatment, read_rays, write_at, write_atomically,
-    write_weights,
+    FitFile, InputSample, ListedRay, MonteCarlo, RayChart, Treatment, read_rays, write_at,
+    write_atomically, write_weights,
 };
 use crate::plan::Wanted;
+use crate::rig::Reading;
+use crate::rig::calibration::{Fitted, calibrate};
 
 pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
@@ -144,6 +147,7 @@ fn kind_named(name: &str) -> Result<AngularKind, Failure> {
 }
 
 fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
+    let dice = Dice::of(args)?;
     args.chart.demand_none()?;
     if args.u_scale.is_some() {
         return Err(Failure::with_help(
@@ -171,8 +175,12 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         .fitted
         .as_ref()
         .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
+    let monte_carlo = match dice {
+        Some(dice) => Some(roll(dice, &setup, (&results, fitted), &wish, &readings)?),
+        None => None,
+    };
     let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
-    results.write_fit(&path, &setup, fitted).map_err(Failure::midway)?;
+    results.write_fit(&path, &setup, fitted, monte_carlo.as_ref()).map_err(Failure::midway)?;
     derive::write_tables(beside(&path), &results.derived).map_err(Failure::midway)?;
     let treatment = results.treatment(fitted);
     let file = FitFile {
@@ -189,8 +197,33 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         independent: &results.independent,
         derived: &results.derived,
         rounds: &setup.accounts,
+        monte_carlo: monte_carlo.as_ref(),
     };
     show(args, rays, &file, Some(&path))
+}
+
+/// Trials of a run's readings.
+fn roll(
+    dice: Dice,
+    setup: &Setup,
+    (results, fitted): (&Results, &Fitted),
+    wish: &Wish,
+    readings: &[Reading],
+) -> Result<MonteCarlo, Failure> {
+    if let Some(failure) =
+        monte_carlo::refusal(fitted.symmetry.as_ref(), fitted.nonnegative.as_ref())
+    {
+        return Err(failure);
+    }
+    // As the fit took them: the results' own are restated from it.
+    let calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
+    let asked = (setup.plan.derive.as_slice(), results.derived.as_slice());
+    let quantity = setup.rig.detector.quantity;
+    calibrated
+        .tried(fitted, &wish.rules, optics(setup).as_ref(), |trials| {
+            dice.roll(&fitted.fit, trials, quantity, asked)
+        })
+        .map_err(|error| monte_carlo::failed(&error))
 }
 
 fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {
@@ -202,6 +235,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         return Err(Failure::start(format!("--u-relative: {u}; expected a number above 0")));
     }
     let common = scale_of(args)?;
+    let dice = Dice::of(args)?;
     let wish = wished(args, Wish::default())?;
     if wish.rules.drift == Some(true) {
         return Err(Failure::with_help(
@@ -214,6 +248,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     if kept.is_none()
         && args.picture.is_none()
         && args.u_scale.is_none()
+        && dice.is_none()
         && let Some(model) = scan.pinned(&wish)
     {
         return fit_stream(args, rays, wanted, (&scan, model, optics, &wish.rules));
@@ -230,6 +265,18 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     let mut notes = vec![note_on_u(input.has_u(), args.u_relative)];
     notes.extend(args.u_scale.map(|u| format!("all samples share a scale known to {u}, relative")));
     let derived = derive::derive(fit, input.quantity, wanted);
+    let monte_carlo = match dice {
+        Some(dice) => {
+            let refusal = monte_carlo::refusal(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
+            if let Some(failure) = refusal {
+                return Err(failure);
+            }
+            let trials = fit.trials(&readings, optics.as_ref());
+            let trials = trials.map_err(|error| monte_carlo::failed(&error))?;
+            Some(dice.roll(fit, &trials, input.quantity, (wanted, &derived)))
+        }
+        None => None,
+    };
     let named = |sample: &InputSample| (sample.line, sample.ray.ray(), sample.value);
     let used: Vec<_> = input.with_limits().map(named).collect();
     let treatment = Treatment::of(fit, |i| used[i], input.left_out().map(named))
@@ -248,6 +295,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         independent: &[],
         derived: &derived,
         rounds: &[],
+        monte_carlo: monte_carlo.as_ref(),
     };
     if let Some(path) = &args.picture {
         picture::write(path, fit, input.quantity, &samples)?;
@@ -296,6 +344,7 @@ fn fit_stream(
         independent: &[],
         derived: &derived,
         rounds: &[],
+        monte_carlo: None,
     };
     write_and_show(args, rays, &file)
 }
@@ -415,6 +464,7 @@ fn summary(args: &FitArgs, file: &FitFile<'_>, written: Option<&Path>) -> String
     rows.extend(treatment_rows(file.treatment, file.quantity));
     rows.extend(field_rows(fit, file.quantity));
     rows.extend(derive::rows(file.derived, file.quantity));
+    rows.extend(file.monte_carlo.map_or_else(Vec::new, monte_carlo::rows));
     rows.extend(file.notes.iter().map(|note| row("note", note)));
     rows.extend(written.map(|path| row("written to", path.display().to_string())));
     table(&rows)

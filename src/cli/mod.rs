@@ -17,6 +17,7 @@ mod folder;
 mod frontier;
 mod hand;
 mod inputs;
+mod monte_carlo;
 mod nominal;
 mod outlook;
 mod output;

@@ -249,6 +249,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
         independent: &[],
         derived: &derived,
         rounds: &[],
+        monte_carlo: None,
     };
     if let Some(path) = &args.output {
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;

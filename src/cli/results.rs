@@ -12,8 +12,9 @@ use super::folder::JOURNAL;
 use super::report::{self, REPORT, RunRecord};
 use super::setup::Setup;
 use crate::export::{
-    AccuracyPoint, DerivedQuantity, ExportError, FitFile, SamplesMeta, Treatment, TruePeak, Truth,
-    write_accuracy, write_atomically, write_readings, write_samples, write_weights,
+    AccuracyPoint, DerivedQuantity, ExportError, FitFile, MonteCarlo, SamplesMeta, Treatment,
+    TruePeak, Truth, write_accuracy, write_atomically, write_readings, write_samples,
+    write_weights,
 };
 use crate::journal::{Header, InputRole, Order, Reader};
 use crate::rig::Reading;
@@ -109,7 +110,7 @@ impl Results {
             write_accuracy(out, quantity, &self.accuracy)
         })?;
         if let Ok(fitted) = &self.fitted {
-            self.write_fit(&folder.join("fit.json"), setup, fitted)?;
+            self.write_fit(&folder.join("fit.json"), setup, fitted, None)?;
             write_tables(folder, &self.derived)?;
             let treatment = self.treatment(fitted);
             if treatment.is_long() {
@@ -160,6 +161,7 @@ impl Results {
         path: &Path,
         setup: &Setup,
         fitted: &Fitted,
+        monte_carlo: Option<&MonteCarlo>,
     ) -> Result<(), ExportError> {
         let treatment = self.treatment(fitted);
         let file = FitFile {
@@ -176,6 +178,7 @@ impl Results {
             independent: &self.independent,
             derived: &self.derived,
             rounds: &setup.accounts,
+            monte_carlo,
         };
         write_atomically(path, |out| file.write(out))
     }

@@ -207,6 +207,7 @@ pub(crate) fn model_rows(
     let mut rows = vec![row("basis", basis)];
     rows.extend(choice.map(|choice| row("  chosen by", choice_in_words(choice))));
     rows.extend(resolves.map(|resolves| row("resolves", resolves_in_words(resolves))));
+    rows.extend(fit.aliased().map(|cause| row("note", cause.to_string())));
     rows
 }
 

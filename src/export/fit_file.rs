@@ -9,7 +9,7 @@ use fit::{
 use serde_json::{Map, Value, json};
 
 use super::charted::{put_charted, ray_json, region_json};
-use super::{DerivedQuantity, Treatment};
+use super::{DerivedQuantity, MonteCarlo, Treatment};
 use crate::rig::Quantity;
 use crate::study::adaptive::Account;
 
@@ -42,6 +42,8 @@ pub struct FitFile<'a> {
     pub derived: &'a [DerivedQuantity],
     /// What was found after each round of a run that decided on the way; empty for others.
     pub rounds: &'a [Account],
+    /// What a propagation of distributions found; `None` where none was asked for.
+    pub monte_carlo: Option<&'a MonteCarlo>,
 }
 
 /// What leaves a simulated sample, by the definitions of the fit's own quantities.
@@ -121,10 +123,12 @@ impl FitFile<'_> {
         put("drift", self.treatment.drift_json());
         put("symmetry", self.treatment.symmetry_json());
         put("nonnegative", self.treatment.nonnegative_json());
-        put("notes", json!(self.notes));
         if !self.rounds.is_empty() {
             put("rounds", json!(self.rounds));
         }
+        let aliased = fit.aliased().map(|cause| cause.to_string());
+        put("notes", self.notes.iter().cloned().chain(aliased).map(Value::from).collect());
+        put("monte_carlo", self.monte_carlo.map_or(Value::Null, MonteCarlo::json));
         if fit.region().chart == Chart::Surface {
             put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
             put("uncertainty_budget_exitance_independent", budget(self.independent));
@@ -348,6 +352,7 @@ mod tests {
             independent: &[],
             derived: &[],
             rounds: &[],
+            monte_carlo: None,
         };
         let json = written(&file);
         let number = |path: &str| json.pointer(path).and_then(Value::as_f64).expect(path);
@@ -397,6 +402,7 @@ mod tests {
                 independent: &[],
                 derived: &[],
                 rounds: &[],
+                monte_carlo: None,
             };
             let json = written(&file);
             let object = json.as_object().unwrap();

@@ -17,6 +17,7 @@ mod fit_file;
 mod frontier;
 mod input;
 mod input_blocks;
+mod monte_carlo;
 mod number;
 mod partial_file;
 mod ray_chart;
@@ -41,6 +42,7 @@ pub use input::{
     CsvError, InputSample, InputSamples, read_rays, read_samples, read_samples_in, write_at,
 };
 pub use input_blocks::{BlockError, read_sample_blocks};
+pub use monte_carlo::{COVERAGE_95, MonteCarlo, PeakDirection, Propagated};
 pub use partial_file::{PartialFile, PartialFileError, PartialsDiffer, ReadPartial};
 pub use ray_chart::{ListedRay, RayChart};
 pub use readings::write_readings;

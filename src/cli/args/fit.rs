@@ -72,6 +72,14 @@ pub(crate) struct FitArgs {
     /// Example: --derive "irradiance at_mm=0,0,500 normal=0,0,-1"
     #[arg(long, value_name = "SPEC")]
     pub(crate) derive: Vec<String>,
+    /// Propagate distributions (JCGM 101) by so many trials, 100 to 1000000: readings and what they
+    /// share are drawn again and refitted. Mean, u and 95 % intervals of exitance, flux, intensity
+    /// along the normal, peak and its direction, and of what --derive asks for.
+    #[arg(long, value_name = "N", conflicts_with_all = ["partial", "merge"])]
+    pub(crate) monte_carlo: Option<usize>,
+    /// The seed of what --monte-carlo draws.
+    #[arg(long, value_name = "S", default_value_t = 1, requires = "monte_carlo")]
+    pub(crate) seed: u64,
     /// For a CSV without a column of uncertainties: each one's, relative to the RMS of all. Of
     /// partial fits --merge takes it.
     #[arg(long, value_name = "U")]

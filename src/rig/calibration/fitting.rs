@@ -5,6 +5,8 @@ use fit::{
     SymmetryError, SymmetryTest, Wish,
 };
 
+use fit::trials::Trials;
+
 use super::{Calibrated, FitInput, FittedDrift, Flag, Sample};
 
 /// A fit, what it was chosen from, and how many samples it does not rest on.
@@ -49,6 +51,20 @@ impl Calibrated {
         let ruled = fit::fit_wished(&readings, region, wish, optics)?;
         let ruled = ruled.with_truncation(&readings, optics)?;
         Ok(self.fitted(input, ruled, region, optics))
+    }
+
+    /// Hands over trials of the readings that a fit was made of, by the rules and the optics that it
+    /// was made with.
+    pub fn tried<T>(
+        &self,
+        fitted: &Fitted,
+        rules: &Rules,
+        optics: Option<&Optics>,
+        make: impl FnOnce(&Trials<'_>) -> T,
+    ) -> Result<T, FitError> {
+        let input = self.fit_input(rules);
+        let flown = self.flown(&input);
+        Ok(make(&fitted.fit.trials(&input.readings(&flown), optics)?))
     }
 
     /// The same with a basis and a penalty that are known.
