@@ -190,12 +190,7 @@ impl fmt::Display for FitError {
                  without"
             ),
             Self::BasisOfChart { kind, chart } => basis_of_chart(f, kind, chart),
-            Self::PlanesTooNear { distance_m } => write!(
-                f,
-                "planes {} mm apart are too near to each other for their size: the throughput \
-                 between them can't be integrated",
-                distance_m * 1e3
-            ),
+            Self::PlanesTooNear { distance_m } => planes_too_near(f, distance_m * 1e3),
             Self::OutsideSecondPlane { index, s_m, t_m } => {
                 let (s_mm, t_mm) = (s_m * 1e3, t_m * 1e3);
                 write!(
@@ -253,6 +248,14 @@ impl fmt::Display for FitError {
             }
         }
     }
+}
+
+fn planes_too_near(f: &mut fmt::Formatter<'_>, distance_mm: f64) -> fmt::Result {
+    write!(
+        f,
+        "planes {distance_mm} mm apart are too near to each other for their size: the throughput \
+         between them can't be integrated"
+    )
 }
 
 fn unsound_penalty(f: &mut fmt::Formatter<'_>, penalty: &Penalty) -> fmt::Result {

@@ -63,7 +63,7 @@ impl Solved {
 
     /// What other readings make of the field's coefficients, a column for each set: of their products
     /// with the rows, AᵀW^½ y, nuisances first, (RᵀR)⁻¹ times that.
-    pub(crate) fn refitted(&self, sides: Mat<f64>) -> Mat<f64> {
+    pub(crate) fn refitted(&self, sides: &Mat<f64>) -> Mat<f64> {
         let (q, p) = (self.count, self.field.len());
         let mut field = sides.as_ref().get(q.., ..).to_owned();
         if q > 0 {

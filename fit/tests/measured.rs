@@ -65,7 +65,7 @@ fn grids_without_gaps_are_whole_however_sparse() {
 
 #[test]
 fn a_symmetry_measures_what_lies_across_the_mirror() {
-    let half = grid(4, 5, |_, phi| (0.0..=180.0).contains(&phi) || phi == -180.0);
+    let half = grid(4, 5, |_, phi| (0.0..=180.0).contains(&phi) || phi <= -180.0);
     let fit = fitted(&half, 2);
     let part = fit.measured_fraction().unwrap() / cone();
     // And what lies within the mesh's reach, 4°, on the other side.

@@ -174,7 +174,9 @@ impl Trials<'_> {
                 for (out, column) in out.iter_mut().zip(self.columns) {
                     *out = column[i];
                 }
-                out.iter_mut().for_each(|value| *value /= self.sigmas[i]);
+                for value in out {
+                    *value /= self.sigmas[i];
+                }
             }
             sides += rows * draws(some.len(), count, normal);
         }
@@ -195,7 +197,7 @@ impl Trials<'_> {
                 }
             }
         }
-        self.solved.refitted(sides)
+        self.solved.refitted(&sides)
     }
 
     fn missed(&self) -> Option<&[Vec<f64>]> {

@@ -69,7 +69,7 @@ impl Spread {
     }
 }
 
-/// √(p (1 - p))/φ(z_p) for p = 0.975: the standard deviation of a normal sample's quantile times √n.
+/// `√(p (1 - p))/φ(z_p)` for p = 0.975: the standard deviation of a normal sample's quantile times √n.
 const END_SD: f64 = 2.671;
 
 #[cfg(test)]
