@@ -122,7 +122,15 @@ impl Fit {
             demand("shift", p, &common.shift)?;
         }
         let beyond = parts.truncation.as_ref().map(|t| beyond(t, p, parts.region)).transpose()?;
-        Ok(Self { basis, beyond, parts, influence: None, weighed: None, measured: None, sparse: None })
+        Ok(Self {
+            basis,
+            beyond,
+            parts,
+            influence: None,
+            weighed: None,
+            measured: None,
+            sparse: None,
+        })
     }
 
     /// Of parts without a factor, whose covariance is the inverse of what a sparse one stands for.
@@ -136,7 +144,15 @@ impl Fit {
             demand("shift", basis.len(), &common.shift)?;
         }
         let sparse = Some(factor);
-        Ok(Self { basis, beyond: None, parts, influence: None, weighed: None, measured: None, sparse })
+        Ok(Self {
+            basis,
+            beyond: None,
+            parts,
+            influence: None,
+            weighed: None,
+            measured: None,
+            sparse,
+        })
     }
 
     /// Whether the fit is one in so many local functions that its covariance is not kept as a matrix:
@@ -193,7 +209,15 @@ impl Fit {
             truncation: None,
         };
         let (beyond, influence, weighed) = (None, None, None);
-        Self { basis: self.basis.clone(), beyond, parts, influence, weighed, measured: None }
+        Self {
+            basis: self.basis.clone(),
+            beyond,
+            parts,
+            influence,
+            weighed,
+            measured: None,
+            sparse: None,
+        }
     }
 
     /// The same fit with other coefficients in the same basis.
