@@ -6,9 +6,10 @@ use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
 use crate::measured::Measured;
+use crate::parts::demand;
 use crate::{
-    BasisSpec, BeamRows, Cause, FitError, Functional, Influence, Penalised, Penalty, Ray, Region,
-    Truncation, Weighed, sparse,
+    BasisSpec, BeamRows, Cause, CommonShift, FitError, Functional, Influence, Parts, Penalised,
+    Penalty, Ray, Region, Truncation, Weighed, sparse,
 };
 use radiometry::DomainError;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -34,64 +35,6 @@ pub struct Contribution {
     pub u: f64,
 }
 
-/// The numbers that a fit consists of, to be stored and taken up again.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Parts {
-    /// What the fit stands for.
-    pub region: Region,
-    /// Which functions, and what was held against them.
-    pub model: Penalised,
-    /// One a function, in the value's unit.
-    pub coefficients: Vec<f64>,
-    /// The upper triangular S of the independent covariance S Sᵀ (with a penalty the posterior's, see
-    /// [`Penalty`]), packed by columns: S₀₀, S₀₁, S₁₁,
-    /// S₀₂, ... Empty where [`Fit::is_sparse`]: such parts can't be taken up again.
-    pub factor: Vec<f64>,
-    /// The coefficients' shift by one u of each common component.
-    pub shifts: Vec<CommonShift>,
-    /// How good the fit is.
-    pub quality: Quality,
-    /// What the functions can't follow, as far as the readings tell; see
-    /// [`Fit::with_truncation`]. The factor is then that of the noise beside it.
-    pub truncation: Option<Truncation>,
-}
-
-/// The coefficients' shift by one standard uncertainty of a common component.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CommonShift {
-    /// The component.
-    pub name: String,
-    /// One number a coefficient.
-    pub shift: Vec<f64>,
-}
-
-/// What tells a good fit from a bad one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
-    /// Condition number of the weighted design matrix, its columns scaled to equal length.
-    pub condition: f64,
-    /// Samples used.
-    pub n_used: usize,
-    /// Samples less coefficients, or less what the samples determine of them where a penalty helps.
-    pub dof: usize,
-    /// How many coefficients the samples determine: all of them without a penalty, fewer with one
-    /// (the trace of the matrix from values to fitted values).
-    pub determined: f64,
-    /// Root mean square of value - fitted, unweighted, in the value's unit.
-    pub residual_rms: f64,
-    /// Sum of squared residuals over the samples' stated variance; about `dof` where noise and
-    /// basis are right. Samples of unknown noise count with the excess.
-    pub chi2: f64,
-    /// Standard deviation of scatter beyond the stated noise, in the value's unit: what the basis
-    /// can't follow, pose jitter, drift. 0 unless chi2 exceeds its dof by 3 of its standard
-    /// deviations (or the noise was unknown). It is part of the weights and of every u, taken as
-    /// independent from reading to reading, as far as
-    /// [`Fit::with_truncation`] does not find another reason for it.
-    pub excess_rms: f64,
-    /// How the rows stand for the detector's beam; `None` where none was known.
-    pub beam: Option<BeamRows>,
-}
-
 /// The fitted field L(x, y, θ, φ), with its covariance.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -109,19 +52,7 @@ pub struct Fit {
 impl Fit {
     /// Takes up stored parts.
     pub fn from_parts(parts: Parts) -> Result<Self, FitError> {
-        if !parts.region.is_sound() {
-            return Err(FitError::Region);
-        }
-        parts.model.basis.checked_len()?;
-        parts.model.check()?;
-        let basis = Basis::new(parts.model.basis, parts.region)?;
-        let p = basis.len();
-        demand("coefficients", p, &parts.coefficients)?;
-        demand("factor", p * (p + 1) / 2, &parts.factor)?;
-        for common in &parts.shifts {
-            demand("shift", p, &common.shift)?;
-        }
-        let beyond = parts.truncation.as_ref().map(|t| beyond(t, p, parts.region)).transpose()?;
+        let (basis, beyond) = parts.checked()?;
         Ok(Self {
             basis,
             beyond,
@@ -392,7 +323,7 @@ impl Fit {
         self.parts.model
     }
 
-    /// See [`Quality::determined`].
+    /// See [`Quality::determined`](crate::Quality::determined).
     pub fn determined(&self) -> f64 {
         self.parts.quality.determined
     }
@@ -402,37 +333,37 @@ impl Fit {
         &self.parts.region
     }
 
-    /// See [`Quality::condition`].
+    /// See [`Quality::condition`](crate::Quality::condition).
     pub fn condition(&self) -> f64 {
         self.parts.quality.condition
     }
 
-    /// See [`Quality::dof`].
+    /// See [`Quality::dof`](crate::Quality::dof).
     pub fn dof(&self) -> usize {
         self.parts.quality.dof
     }
 
-    /// See [`Quality::n_used`].
+    /// See [`Quality::n_used`](crate::Quality::n_used).
     pub fn n_used(&self) -> usize {
         self.parts.quality.n_used
     }
 
-    /// See [`Quality::residual_rms`].
+    /// See [`Quality::residual_rms`](crate::Quality::residual_rms).
     pub fn residual_rms(&self) -> f64 {
         self.parts.quality.residual_rms
     }
 
-    /// See [`Quality::chi2`].
+    /// See [`Quality::chi2`](crate::Quality::chi2).
     pub fn chi2(&self) -> f64 {
         self.parts.quality.chi2
     }
 
-    /// See [`Quality::excess_rms`].
+    /// See [`Quality::excess_rms`](crate::Quality::excess_rms).
     pub fn excess_rms(&self) -> f64 {
         self.parts.quality.excess_rms
     }
 
-    /// See [`Quality::beam`].
+    /// See [`Quality::beam`](crate::Quality::beam).
     pub fn beam(&self) -> Option<BeamRows> {
         self.parts.quality.beam
     }
@@ -517,25 +448,6 @@ impl Estimate {
             u: self.u * factor.abs(),
             u_independent: self.u_independent * factor.abs(),
         }
-    }
-}
-
-/// The finer functions of a truncation that is sound beside p functions.
-fn beyond(truncation: &Truncation, p: usize, region: Region) -> Result<Basis, FitError> {
-    truncation.beyond.checked_len()?;
-    let basis = Basis::new(truncation.beyond, region)?;
-    for field in &truncation.missed {
-        demand("missed field", p + basis.len(), field)?;
-    }
-    Ok(basis)
-}
-
-fn demand(what: &'static str, expected: usize, numbers: &[f64]) -> Result<(), FitError> {
-    let found = numbers.iter().filter(|number| number.is_finite()).count();
-    if found == expected && numbers.len() == expected {
-        Ok(())
-    } else {
-        Err(FitError::Parts { what, expected, found })
     }
 }
 

@@ -7,7 +7,8 @@
 use crate::basis::dot;
 use crate::beam::Optics;
 use crate::beam::design::Design;
-use crate::fitted::{CommonShift, Fit, Parts, Quality};
+use crate::fitted::Fit;
+use crate::parts::{CommonShift, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::solve::{left_over, needs_a_side, ready, sensitivities, shifts, solve_readings};
 use crate::triangle::Solution;

@@ -10,7 +10,7 @@
 //! symmetric fields alone.
 
 use crate::basis::Basis;
-use crate::fitted::CommonShift;
+use crate::parts::CommonShift;
 use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region, sparse};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};

@@ -1,7 +1,7 @@
 //! From the triangle of all readings to the fit: their noise as a whole, and the covariance.
 
 use super::{Partial, Sums, Weighting};
-use crate::fitted::{CommonShift, Parts, Quality};
+use crate::parts::{CommonShift, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::solve::left_over;
 use crate::triangle::{Solution, Spectrum};

@@ -14,13 +14,13 @@ use crate::basis::{Basis, Directions};
 use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check;
-use crate::fitted::{Fit, Parts};
 use crate::penalty::sparse_roughness;
 use crate::solve::{
     Rows, check_readings, levels, needs_a_side, quality, sensitivities, shifts, weighed,
 };
 use crate::weights::{Model, PASSES_MAX, REWEIGHING_MAX, Settled, moved, start};
 use crate::{BasisSpec, Common, FitError, Penalised, Penalty, Readings, Region, Robust};
+use crate::{Fit, Parts};
 use std::sync::Arc;
 
 mod factor;

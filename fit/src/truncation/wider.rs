@@ -5,7 +5,7 @@ use super::likeliest::{Hold, Likeliest, POWER, Shares};
 use super::{COSINE_COLUMNS, Shared, Truncation};
 use crate::basis::dot;
 use crate::beam::design::Design;
-use crate::fitted::Parts;
+use crate::parts::Parts;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::has_unknown;
