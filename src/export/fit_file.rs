@@ -308,11 +308,11 @@ mod tests {
             x_m: 0.0,
             y_m: 0.0,
             theta_rad: f64::from(i % 8) * 0.2,
-            phi_rad: f64::from(i / 8) * 2.1,
+            phi_rad: f64::from(i / 8) * PI / 3.0,
         };
         let noise = Noise::Fixed { variance: 0.01 };
         let samples: Vec<Sample> =
-            (0..24).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
+            (0..48).map(|i| Sample { ray: ray(i), value: 100.0, noise }).collect();
         let region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
         let basis = BasisSpec::zernike(2, 0);
         let scale = Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale };
