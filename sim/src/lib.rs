@@ -5,10 +5,12 @@
 //! would keep to itself. On given [`Terms`], [`compile()`] turns them into a [`Compiled`] rig: its rows of
 //! effects, its truth, and the [`SimulatedBoard`] that the device core drives. [`serve()`] puts a
 //! device on a byte stream paced like a [`Wire`], and [`Pty`] is such a stream for other programs.
+//! Devices of other makes are [`Twin`]s around the same board, on a [`Bench`].
 //!
 //! The crate does not know the host: not its kinematics, not its calibration, not its files. It
 //! computes from its own mechanical truth, so that a wrong sign on either side shows.
 
+mod bench;
 mod board;
 mod chance;
 mod check;
@@ -31,8 +33,10 @@ mod switches;
 mod terms;
 mod time;
 mod truth;
+mod twin;
 mod wire;
 
+pub use bench::Bench;
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
 pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
@@ -50,9 +54,10 @@ pub use scene::{
     Lobe, Lobes, Outline, Reflection, SHARPNESS_MAX, Scene, SceneError, Shape, Solid, Surface,
     Tabulated, TabulatedError, Window, WindowOwner,
 };
-pub use serve::serve;
+pub use serve::{serve, serve_bench};
 pub use simulated::{LinkFaults, Simulated};
 pub use terms::Terms;
 pub use time::{MainsFlicker, SourceOverTime, WarmUp};
 pub use truth::{Peak, Region, Truth};
+pub use twin::Twin;
 pub use wire::Wire;

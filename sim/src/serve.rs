@@ -1,11 +1,15 @@
 //! Puts a device on a byte stream: an in-memory one in virtual time, or a pseudo-terminal in real
 //! time. The only room of the crate that reads a clock, and that is tokio's.
 
+mod lines;
+
 use std::io;
 use std::time::Duration;
 
 use firmware_protocol::{Board, Device, Instant};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+
+pub use lines::serve_bench;
 
 use crate::wire::{Wire, Wired};
 

@@ -44,13 +44,14 @@ impl Wire {
     }
 
     /// When the last of `len` bytes has passed whose first sets out at `from`.
-    fn passed(&self, from: Instant, len: usize) -> Instant {
+    pub(crate) fn passed(&self, from: Instant, len: usize) -> Instant {
         let bits = BITS_A_BYTE * len as u64;
         let micros = (bits * MICROS_A_SECOND).div_ceil(u64::from(self.baud));
         Instant::from_micros(from.micros() + micros)
     }
 
-    fn carry(&mut self, bytes: &[u8]) -> Vec<u8> {
+    /// What arrives of bytes that are sent.
+    pub(crate) fn carry(&mut self, bytes: &[u8]) -> Vec<u8> {
         let Some(Faults { rates, chance }) = &mut self.faults else { return bytes.to_vec() };
         let mut carried = Vec::with_capacity(bytes.len());
         for byte in bytes {
