@@ -71,15 +71,42 @@ pub fn read_sample_blocks<E>(
 
 /// After the last line end that is in no quoted field.
 fn last_line_end(text: &[u8]) -> Option<usize> {
-    let (mut quoted, mut last) = (false, None);
+    let (mut stands, mut last) = (Stands::AtLine, None);
     for (at, byte) in text.iter().enumerate() {
-        match byte {
-            b'"' => quoted = !quoted,
-            b'\n' if !quoted => last = Some(at + 1),
-            _ => {}
+        stands = stands.after(*byte);
+        if *byte == b'\n' && stands == Stands::AtLine {
+            last = Some(at + 1);
         }
     }
     last
+}
+
+/// Where in a CSV a byte stands: quotes are such at a field's beginning alone, and in comments none is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stands {
+    AtLine,
+    AtField,
+    InField,
+    InQuotes,
+    /// At the field's end, or between the two quotes that stand for one.
+    BehindQuotes,
+    InComment,
+}
+
+impl Stands {
+    const fn after(self, byte: u8) -> Self {
+        match (self, byte) {
+            (Self::InComment, b'\n') => Self::AtLine,
+            (Self::InComment, _) | (Self::AtLine, b'#') => Self::InComment,
+            (Self::InQuotes, b'"') => Self::BehindQuotes,
+            (Self::InQuotes, _) | (Self::AtLine | Self::AtField | Self::BehindQuotes, b'"') => {
+                Self::InQuotes
+            }
+            (_, b'\n' | b'\r') => Self::AtLine,
+            (_, b',') => Self::AtField,
+            _ => Self::InField,
+        }
+    }
 }
 
 /// The first line that is neither empty nor a comment, with its end.
@@ -119,6 +146,18 @@ mod tests {
             let text = text(rows);
             assert!(rows == 1 || text.len() > 5 * BLOCK_BYTES);
             assert_eq!(read(&text).unwrap(), read_samples(text.as_bytes()).unwrap().samples);
+        }
+    }
+
+    #[test]
+    fn a_quote_in_a_comment_or_amid_a_field_opens_nothing() {
+        let rows: String = (0..40).map(|i| format!("0,0,{i},0,1.5,\n")).collect();
+        for odd in ["# 5\" across\n", "0,0,1,1,1.5,5\" across\n", "0,0,1,1,1.5,\"5\"\" across\"\n"]
+        {
+            let text = format!("# a lamp of 2\"\n{HEADER}{odd}{rows}{odd}");
+            let text = text.trim_end_matches(if odd.starts_with('#') { "" } else { odd });
+            assert!(text.len() > 3 * BLOCK_BYTES);
+            assert_eq!(read(text).unwrap(), read_samples(text.as_bytes()).unwrap().samples);
         }
     }
 
