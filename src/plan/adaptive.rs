@@ -13,6 +13,9 @@ use crate::rig::Rig;
 
 const TARGET: Bounds = Bounds::positive_up_to(1.0);
 const NARROWEST_DEG: Bounds = Bounds::between(0.5, 180.0);
+/// Sweeps that are decided upon at most, those of the first round among them; a decision's time grows
+/// with their cube.
+pub const SWEEPS_MAX: usize = 300;
 /// More places than this in a row are a map of their own, not a beginning.
 const PLACES_MAX: i64 = 64;
 /// Meridians of the first round for each place, at least: two ways over the top tell a lobe's side.
@@ -110,6 +113,17 @@ impl Adaptive {
         spacing * libm::sin(plan.region.theta_max_rad)
     }
 
+    /// How many sweeps the first round has, and the key of the plan that asks for so many.
+    pub(super) fn first_sweeps(&self, plan: &Plan, rig: &Rig) -> (usize, &'static str) {
+        let count = self.meridians(plan, rig);
+        let key = match self.phi_step_deg {
+            _ if count == PER_PLACE * self.x_count * self.y_count => "x_count",
+            Some(_) => "phi_step_deg",
+            None => "narrowest_feature_deg",
+        };
+        ((count + first_checks(count)) as usize, key)
+    }
+
     /// How many meridians (pairs of them, over the top) the first round has.
     fn meridians(&self, plan: &Plan, rig: &Rig) -> u32 {
         let turn = if sweep::reaches_over(plan, rig) { PI } else { TAU };
@@ -137,8 +151,7 @@ impl Adaptive {
             let phi_rad = turn * f64::from(k) / f64::from(count);
             Meridian { x_m, y_m, phi_rad, theta_rad: range(plan, rig) }
         };
-        let checks = CHECKS_MIN.max(count / MERIDIANS_PER_CHECK);
-        let checks = (0..checks).map(|j| self.check(plan, rig, j));
+        let checks = (0..first_checks(count)).map(|j| self.check(plan, rig, j));
         (0..count).map(meridian).chain(checks).collect()
     }
 
@@ -152,6 +165,11 @@ impl Adaptive {
     pub fn candidate(&self, plan: &Plan, rig: &Rig, i: u32) -> Meridian {
         evenly(plan, rig, i, 0.25)
     }
+}
+
+/// How many sweeps check so many meridians.
+fn first_checks(meridians: u32) -> u32 {
+    CHECKS_MIN.max(meridians / MERIDIANS_PER_CHECK)
 }
 
 /// From the lowest to the highest angle of the arm.

@@ -147,6 +147,20 @@ fn what_contradicts_itself_is_refused_with_its_key() {
         let problem = read(&schedule, stop).unwrap_err().to_string();
         assert!(problem.contains(key) && problem.contains(what), "{problem}");
     }
+    for (schedule, key, sweeps) in [
+        (
+            terms("x_count = 3", "x_count = 64").replace("y_count = 2", "y_count = 64"),
+            "x_count",
+            9216,
+        ),
+        (terms("12", "0.5"), "narrowest_feature_deg", 399),
+        (format!("{SCHEDULE}\nphi_step_deg = 0.5"), "phi_step_deg", 405),
+    ] {
+        let problem = read(&schedule, STOP).unwrap().lay_out(&rig(), None).unwrap_err().to_string();
+        let said = format!("{sweeps} sweeps");
+        assert!(problem.contains(key) && problem.contains(&said), "{problem}");
+        assert!(problem.contains("at most 300"), "{problem}");
+    }
     let short = read(SCHEDULE, "[stop]\nrig_time_s_max = 30").unwrap();
     let problem = short.lay_out(&rig(), None).unwrap_err().to_string();
     assert!(problem.contains("rig_time_s_max") && problem.contains("first round"), "{problem}");

@@ -140,6 +140,16 @@ impl Prediction {
     }
 }
 
+/// What steps take, one after the other from `here`, seconds.
+pub fn time_of(rig: &Rig, mut here: Latched, steps: &[Step]) -> f64 {
+    let time = |step: &Step| {
+        let time = StepTime::of(rig, here, step);
+        here = step.rests_at(rig);
+        time.total_s()
+    };
+    steps.iter().map(time).sum()
+}
+
 /// Both counts are bounded when a sequence is laid out.
 fn count(len: usize) -> u32 {
     u32::try_from(len).unwrap_or(u32::MAX)

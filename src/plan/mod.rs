@@ -35,8 +35,8 @@ mod terms;
 mod tree;
 mod wanted;
 
-pub use adaptive::Adaptive;
-pub use cost::{Prediction, StepTime, TimeLeft};
+pub use adaptive::{Adaptive, SWEEPS_MAX};
+pub use cost::{Prediction, StepTime, TimeLeft, time_of};
 pub use expect::Expect;
 pub use hash::PlanHash;
 pub use rewrite::{Change, rewrite};

@@ -9,7 +9,7 @@ use spanned_toml::Problem;
 
 use super::builder::{Builder, Place};
 use super::sweep::{self, Line};
-use super::{Adaptive, Plan, Prediction, Sequence, Step, StepTime, Target};
+use super::{Adaptive, Plan, Prediction, SWEEPS_MAX, Sequence, Step, Target, time_of};
 use crate::rig::{
     Approach, AxisPositions, Flight, Latched, ReadingKind, Rig, comes_to_rest, forward, set_out,
 };
@@ -84,12 +84,7 @@ impl Plan {
         let reference = self.reference_on(rig)?;
         let builder = Builder::new(self, rig, gain, reference).following(after.step, after.here);
         let (steps, _) = self.fill_round(rig, after, wanted, builder)?;
-        let mut here = after.here;
-        let mut seconds = 0.0;
-        for step in &steps {
-            seconds += StepTime::of(rig, here, step).total_s();
-            here = step.rests_at(rig);
-        }
+        let seconds = time_of(rig, after.here, &steps);
         Ok(Round { steps, seconds })
     }
 
@@ -102,6 +97,7 @@ impl Plan {
         reference: Place,
     ) -> Result<Sequence, Problem> {
         sweep::check_wire(self, rig)?;
+        self.check_first_round(rig, adaptive)?;
         let wanted = adaptive.first(self, rig);
         let builder = Builder::new(self, rig, gain, reference);
         let after = After { step: 0, target: 0, here: Latched::ZERO };
@@ -122,6 +118,21 @@ impl Plan {
         let reference =
             super::builder::step(0, ReadingKind::Reference, reference, gain, self.reference.dwell);
         Ok(Sequence { targets, steps, prediction, reference })
+    }
+
+    fn check_first_round(&self, rig: &Rig, adaptive: &Adaptive) -> Result<(), Problem> {
+        let (sweeps, key) = adaptive.first_sweeps(self, rig);
+        if sweeps <= SWEEPS_MAX {
+            return Ok(());
+        }
+        Err(self.problem(
+            "schedule",
+            key,
+            &format!("the first round alone has {sweeps} sweeps"),
+            &format!("at most {SWEEPS_MAX}, those that check included"),
+            "begin with fewer places (x_count, y_count) or meridians (phi_step_deg), or look for wider \
+             features (narrowest_feature_deg)",
+        ))
     }
 
     fn fill_round(
