@@ -140,6 +140,58 @@ fn a_dim_source_is_not_taken_for_a_good_fit() {
     }
 }
 
+/// With so little time that a round is broken off: what the plan foretells of its first one does not
+/// know how long warming up takes.
+fn short_of_time(bench: Bench, room_s: f64) -> Bench {
+    let foretold: Value =
+        serde_json::from_str(&bench.gonio(&["plan", "plan.toml", "--json"]).out).unwrap();
+    let most_s = number(&foretold["adaptive"]["first_round_s"]) + room_s;
+    let most = format!("rig_time_s_max = {most_s}");
+    let gate = "[warm_up]\ntolerance_relative = 0.5\nover_s = 20\ntimeout_s = 100\n";
+    let bench = bench.with("plan.toml", "rig_time_s_max = 600", &most);
+    let plan = bench.text("plan.toml");
+    bench.having("plan.toml", format!("{plan}\n{gate}"))
+}
+
+#[test]
+fn a_run_that_its_time_breaks_off_has_a_last_word() {
+    let (said, summary) = run(&short_of_time(asked(bench(), "0.02"), 1.0));
+    assert_eq!(said.code, Some(1), "{said}");
+    assert!(said.err.contains("the rig's time is used up after"), "{said}");
+    assert!(said.err.contains("the largest part is"), "{said}");
+    let broken_off = rounds(&summary);
+    assert_eq!((broken_off.len(), &broken_off[0]["verdict"]["is_met"]), (1, &Value::Bool(false)));
+    assert!(summary["targets_measured"].as_u64() < summary["targets_planned"].as_u64(), "{said}");
+    // And if what there is by then is enough, it is.
+    let bench = short_of_time(
+        bench().with("plan.toml", "radiance_relative = 0.02", "exitance_relative = 0.1"),
+        15.0,
+    );
+    let (said, summary) = run(&bench);
+    assert_eq!(rounds(&summary)[0]["verdict"]["is_met"], Value::Bool(true), "{said}");
+    assert_eq!(said.code, Some(0), "{said}");
+    // The same from the journal alone.
+    bench.gonio(&["fit", "out"]).well();
+    assert_eq!(bench.json("out/fit.json")["rounds"], summary["adaptive"]["rounds"]);
+}
+
+#[test]
+fn a_sweep_flown_in_parts_is_one_sweep() {
+    // 150° in windows of 0.1°: more of them than a device keeps.
+    let bench = bench()
+        .with(
+            "plan.toml",
+            "narrowest_feature_deg = 40 ",
+            "narrowest_feature_deg = 0.5\nphi_step_deg = 60 ",
+        )
+        .with("plan.toml", "dwell_ms = 25 ", "dwell_ms = 5 ")
+        .with("plan.toml", "radiance_relative = 0.02", "exitance_relative = 0.001");
+    let (said, summary) = run(&bench);
+    // Four meridians, and four checks.
+    let first = &rounds(&summary)[0];
+    assert_eq!((first["sweeps"].as_u64(), first["checks"].as_u64()), (Some(8), Some(4)), "{said}");
+}
+
 /// Index and radiance of every sample, as they stand in the file.
 fn samples(bench: &Bench, out: &str) -> Vec<(String, String)> {
     let text = bench.text(&format!("{out}/samples.csv"));

@@ -8,12 +8,13 @@ use super::failure::Failure;
 use super::results::{fit_region, optics};
 use super::setup::Setup;
 use super::text::{duration, percent, row};
-use crate::journal::{self, Reader};
+use crate::journal::{self, Order, Reader};
 use crate::plan::{After, Step, WARM_UP_IDS_FROM};
 use crate::report::Section;
 use crate::rig::Reading;
+use crate::run::resume::rule_met;
 use crate::run::{Decide, Decided, Decider, Next};
-use crate::study::adaptive::{Account, Choice, Gaps, Terms, Verdict, decide};
+use crate::study::adaptive::{Account, Choice, Gaps, Terms, Verdict, conclude, decide};
 
 /// Decides for a run that has these readings from earlier sessions; the setup's sequence holds all
 /// steps so far, and its accounts what was decided. `None` if the plan is fixed beforehand.
@@ -22,11 +23,9 @@ pub(crate) fn decider(
     before: Vec<Reading>,
     pace: Pace,
 ) -> Result<Option<Decider>, Failure> {
-    if setup.plan.adaptive().is_none() {
-        return Ok(None);
-    }
+    let Some(terms) = terms(setup)? else { return Ok(None) };
     let mut deciding = Deciding {
-        setup: setup.clone(),
+        terms,
         steps: setup.sequence.steps.clone(),
         accounts: setup.accounts.clone(),
         readings: Vec::new(),
@@ -41,8 +40,29 @@ pub(crate) fn decider(
     }
 }
 
+fn terms(setup: &Setup) -> Result<Option<Terms>, Failure> {
+    Ok(Terms::new(&setup.plan, &setup.rig, fit_region(setup), optics(setup))?)
+}
+
+/// The setup of a run that is over, with the last word on it where its plan's limit ended it between
+/// two decisions.
+pub(crate) fn concluded(mut setup: Setup, reader: &Reader) -> Result<Setup, Failure> {
+    let is_judged = setup.accounts.last().is_some_and(|last| last.verdict.is_some());
+    if is_judged || setup.plan.adaptive().is_none() {
+        return Ok(setup);
+    }
+    let (Some(why), Some(terms)) = (rule_met(&reader.sessions()?), terms(&setup)?) else {
+        return Ok(setup);
+    };
+    let mut readings = reader.readings(Order::Id)?;
+    readings.retain(|reading| reading.id < WARM_UP_IDS_FROM);
+    let account = conclude(&terms, &setup.sequence.steps, &readings, &setup.accounts, &why);
+    setup.accounts.push(account);
+    Ok(setup)
+}
+
 struct Deciding {
-    setup: Setup,
+    terms: Terms,
     steps: Vec<Step>,
     accounts: Vec<Account>,
     readings: Vec<Reading>,
@@ -55,17 +75,12 @@ impl Deciding {
         self.readings.extend(readings.into_iter().filter(|reading| reading.id < WARM_UP_IDS_FROM));
     }
 
-    fn decide(&mut self, readings: Vec<Reading>) -> Decided {
+    fn decide(&mut self, readings: Vec<Reading>) -> Result<Decided, String> {
         self.look(readings);
         let number = u32::try_from(self.accounts.len()).unwrap_or(u32::MAX);
-        let Setup { plan, rig, .. } = &self.setup;
-        let terms = Terms::new(plan, rig, fit_region(&self.setup), optics(&self.setup));
-        let Some(terms) = terms else {
-            // The plan was laid out on this rig before anything moved.
-            let why = "the rig can't fly the plan's sweeps".to_owned();
-            return Decided { number, account: "{}".to_owned(), next: Next::Enough(why) };
-        };
-        let (mut account, choice) = decide(&terms, &self.steps, &self.readings, &self.accounts);
+        let Terms { plan, rig, .. } = &self.terms;
+        let (mut account, choice) =
+            decide(&self.terms, &self.steps, &self.readings, &self.accounts);
         let next = match choice {
             Choice::Measure(wanted) => {
                 match plan.lay_out_round(rig, After::steps(rig, &self.steps), &wanted) {
@@ -83,13 +98,13 @@ impl Deciding {
                 Next::Enough(why.unwrap_or_default())
             }
         };
+        // What can't be written down can't be read back by a resume.
+        let text = serde_json::to_string(&account).map_err(|error| error.to_string())?;
         if let Next::Measure(steps) = &next {
             self.steps.extend(steps);
         }
-        // Numbers and texts always have a form as JSON.
-        let text = serde_json::to_string(&account).unwrap_or_default();
         self.accounts.push(account);
-        Decided { number, account: text, next }
+        Ok(Decided { number, account: text, next })
     }
 }
 
@@ -109,7 +124,7 @@ pub(crate) fn missed(setup: &Setup) -> Option<String> {
     setup.plan.adaptive()?;
     let last = setup.accounts.last();
     let Some(Verdict { is_met, why, largest }) = last.and_then(|last| last.verdict.as_ref()) else {
-        return Some("the accuracy target was missed: the plan's time is used up".to_owned());
+        return Some("the accuracy target was missed: the run is not at its end".to_owned());
     };
     if *is_met {
         return None;

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use fit::{Contribution, Fit, FitError, Optics, Region, Rules, Wish};
 
+use super::adapting;
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
 use super::folder::JOURNAL;
@@ -219,6 +220,7 @@ pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), F
     let setup =
         Setup::from_inputs(reader.inputs()?, name, header.seed, header.effect_wishes.clone())?
             .with_rounds(&reader)?;
+    let setup = adapting::concluded(setup, &reader)?;
     let readings = reader.readings(Order::Taken)?;
     Ok((setup, header, readings))
 }

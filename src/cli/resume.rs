@@ -6,14 +6,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::acquire::{Acquired, Pace, acquire};
-use super::adapting;
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{JOURNAL, effects};
 use super::output::note;
-use super::run::{Ending, finish, first_job};
+use super::run::{Ending, finish, job_after};
 use super::setup::Setup;
-use super::stopping;
 use crate::journal::{Journal, Order, Reader};
 use crate::run::resume::{Remainder, check, remainder};
 use crate::run::{self, Job, OnFault};
@@ -95,9 +93,7 @@ pub(crate) fn job(
     }
     let before = Reader::open(journal)?.readings(Order::Taken)?;
     let rig = Arc::new(setup.rig.clone());
-    let mut job = first_job(setup, on_fault, pace)?;
-    job.rule = stopping::rule(setup, before.clone(), pace)?;
-    job.decider = adapting::decider(setup, before.clone(), pace)?;
+    let mut job = job_after(setup, before.clone(), on_fault, pace)?;
     job.check = Some(check(rig, &setup.sequence, left, before, accepts_drift));
     job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
     job.steps.clone_from(&left.steps);

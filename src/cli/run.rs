@@ -18,6 +18,7 @@ use super::summary::Summary;
 use super::text::shell_word;
 use crate::journal::Order;
 use crate::plan::{DarkMethod, Plan};
+use crate::rig::Reading;
 use crate::run::{self, Job, OnFault};
 
 /// How the person wants the end of it.
@@ -49,11 +50,21 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
 
 /// A run from its beginning.
 pub(crate) fn first_job(setup: &Setup, on_fault: OnFault, pace: Pace) -> Result<Job, Failure> {
+    job_after(setup, Vec::new(), on_fault, pace)
+}
+
+/// The whole run, for somebody who has these readings of it.
+pub(crate) fn job_after(
+    setup: &Setup,
+    before: Vec<Reading>,
+    on_fault: OnFault,
+    pace: Pace,
+) -> Result<Job, Failure> {
     let mut job = Job::new(setup.sequence.steps.clone(), on_fault);
     job.warm_up = setup.plan.warm_up.map(|gate| (gate, setup.sequence.warm_up(0), 0));
     job.rig_time_max = setup.plan.stop.rig_time_max;
-    job.rule = stopping::rule(setup, Vec::new(), pace)?;
-    job.decider = adapting::decider(setup, Vec::new(), pace)?;
+    job.rule = stopping::rule(setup, before.clone(), pace)?;
+    job.decider = adapting::decider(setup, before, pace)?;
     Ok(job)
 }
 
@@ -69,7 +80,8 @@ pub(crate) fn finish(
     let journal = journal
         .map_err(|error| Failure::midway(format!("{error}\n  help: {}", resume_line(folder))))?;
     let is_as_planned = outcome.is_as_planned();
-    let setup = &setup.clone().with_rounds(journal.reader())?;
+    let setup = setup.clone().with_rounds(journal.reader())?;
+    let setup = &adapting::concluded(setup, journal.reader())?;
     let readings = journal.reader().readings(Order::Taken)?;
     let results = match Results::of(setup, setup.plan.fit, &readings) {
         // Too little was measured to say anything.

@@ -97,9 +97,10 @@ impl Course {
     }
 
     /// Whether there is no time for the steps ahead, coming from `here`, and those with which the
-    /// plan closes. Says so once.
+    /// plan closes. Says so once, and never where only those are left: they are taken in any case.
     pub(super) fn is_late(&mut self, mut here: Latched, ahead: &[Step]) -> bool {
-        if self.rig_s_max == f64::INFINITY {
+        let closes = |step: &Step| self.closing.iter().any(|closing| closing.id == step.id);
+        if self.rig_s_max == f64::INFINITY || ahead.last().is_none_or(closes) {
             return false;
         }
         let times = ahead.iter().chain(&self.closing).map(|step| {

@@ -32,8 +32,9 @@ pub enum Next {
     Enough(String),
 }
 
-/// Decides, by the readings of the run's sequence that were taken since it was asked last.
-pub type Decide = Box<dyn FnMut(Vec<Reading>) -> Decided + Send>;
+/// Decides, by the readings of the run's sequence that were taken since it was asked last; or says
+/// why it can't.
+pub type Decide = Box<dyn FnMut(Vec<Reading>) -> Result<Decided, String> + Send>;
 
 /// Asks a decision.
 pub struct Decider {
@@ -43,10 +44,11 @@ pub struct Decider {
 
 enum Form {
     Inline(Decide),
-    Threaded { questions: mpsc::Sender<Question>, answer: Option<oneshot::Receiver<Decided>> },
+    Threaded { questions: mpsc::Sender<Question>, answer: Option<oneshot::Receiver<Answer>> },
 }
 
-type Question = (Vec<Reading>, oneshot::Sender<Decided>);
+type Answer = Result<Decided, String>;
+type Question = (Vec<Reading>, oneshot::Sender<Answer>);
 
 impl Decider {
     /// Asks on the spot, whatever time that takes: for virtual time, which waits.
@@ -72,7 +74,7 @@ impl Decider {
     }
 
     /// Asks; the answer comes at once, or later as [`Decider::answer`].
-    pub(super) fn ask(&mut self) -> Option<Decided> {
+    pub(super) fn ask(&mut self) -> Option<Result<Decided, String>> {
         let readings = std::mem::take(&mut self.shown);
         match &mut self.form {
             Form::Inline(decide) => Some(decide(readings)),
@@ -86,8 +88,8 @@ impl Decider {
         }
     }
 
-    /// Waits for the answer of another thread; for ever where nothing was asked. An error says that
-    /// the thread is gone.
+    /// Waits for the answer of another thread; for ever where nothing was asked. A thread that is
+    /// gone is an error too.
     pub(super) async fn answer(&mut self) -> Result<Decided, String> {
         let Form::Threaded { answer: waiting, .. } = &mut self.form else {
             return std::future::pending().await;
@@ -95,6 +97,20 @@ impl Decider {
         let Some(answer) = waiting else { return std::future::pending().await };
         let decided = answer.await;
         *waiting = None;
-        decided.map_err(|_| "whoever decides what is measured next has failed".to_owned())
+        decided.unwrap_or_else(|_| Err("the thread of decisions has ended".to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_thread_that_panics_has_answered_with_an_error() {
+        let mut decider = Decider::threaded(Box::new(|_| panic!("no more ideas"))).unwrap();
+        for _ in 0..2 {
+            assert!(decider.ask().is_none());
+            assert_eq!(decider.answer().await, Err("the thread of decisions has ended".to_owned()));
+        }
     }
 }

@@ -176,8 +176,7 @@ impl<'a> Engine<'a> {
             }
             Woken::Rule(said) => self.heed(said),
             Woken::Device(event) => self.hear(event),
-            Woken::Decided(Ok(decided)) => self.decided(decided).await,
-            Woken::Decided(Err(why)) => self.enough(why),
+            Woken::Decided(decided) => self.decided(decided).await,
             Woken::Journal => {
                 let failure = self.committed.borrow_and_update().failure.clone();
                 if let Some(failure) = failure {

@@ -160,6 +160,8 @@ pub enum Fault {
     },
     /// After a resume the reference pose reads otherwise than before: the numbers.
     ReferenceMoved(String),
+    /// Nobody can say what is measured next: why.
+    Undecided(String),
     /// Readings can't be kept: what the journal said.
     Journal(String),
 }
@@ -200,6 +202,7 @@ impl fmt::Display for Fault {
                 write!(f, "the reference gave no stable signal in {waited_s:.0} s of warming up")
             }
             Self::ReferenceMoved(numbers) => f.write_str(numbers),
+            Self::Undecided(why) => write!(f, "what is measured next can't be decided: {why}"),
             Self::Journal(why) => write!(f, "the journal takes no more readings: {why}"),
         }
     }

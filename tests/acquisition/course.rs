@@ -3,9 +3,11 @@
 
 use std::time::Duration;
 
-use gonio::plan::{Prediction, Step};
-use gonio::rig::ReadingKind;
-use gonio::run::{Happening, Job, OnFault, Outcome, Progress, Said, State, Watch, Wish};
+use gonio::plan::{Prediction, Step, time_of};
+use gonio::rig::{Latched, ReadingKind};
+use gonio::run::{
+    Decider, Fault, Happening, Job, OnFault, Outcome, Progress, Said, State, Watch, Wish,
+};
 
 use crate::bench::{Folder, device, owner, rig, steps, wait_for_readings, wait_for_state};
 
@@ -100,4 +102,42 @@ async fn a_rule_sees_every_reading_and_leaves_what_the_plan_closes_with() {
     assert!((4..9).contains(&ids.len()), "{ids:?}");
     assert_eq!(ids.last(), Some(&10));
     assert_eq!(gonio::run::resume::rule_met(&reader.sessions().unwrap()), Some("three".into()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_the_plan_closes_with_is_counted_once_when_time_runs_out() {
+    let steps = long_steps();
+    // This rig homes in no time at all.
+    let whole_s = time_of(&rig(), Latched::ZERO, &steps);
+    // Room for all, though not for a second closing reading; and for all targets but the last.
+    for (room_s, expected, done) in [(2.0, "complete", 11), (-4.0, "reached", 10)] {
+        let folder = Folder::new();
+        let owner = owner(device(sim::LinkFaults::default()).opener());
+        let mut job = Job::new(steps.clone(), OnFault::Finish);
+        let most_s = whole_s + room_s;
+        job.rig_time_max = Some(Duration::from_secs_f64(most_s));
+        let running = owner.start(job, folder.journal(&steps)).await.unwrap();
+        let ended = running.ended().await.unwrap();
+        assert_eq!((ended.outcome.name(), ended.done), (expected, done), "{room_s} s");
+        assert!(ended.rig_s <= most_s + 1.0, "{} s of {most_s} s", ended.rig_s);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_that_nobody_decides_for_is_not_at_its_end() {
+    for on_fault in [OnFault::Finish, OnFault::Wait] {
+        let (folder, steps) = (Folder::new(), steps(5));
+        let owner = owner(device(sim::LinkFaults::default()).opener());
+        let mut job = Job::new(steps.clone(), on_fault);
+        job.decider = Some(Decider::inline(Box::new(|_| Err("no more ideas".to_owned()))));
+        let running = owner.start(job, folder.journal(&steps)).await.unwrap();
+        let ended = running.ended().await.unwrap();
+        let fault = Fault::Undecided("no more ideas".to_owned());
+        assert_eq!((ended.outcome, ended.done), (Outcome::Faulted(fault), 5));
+        drop(ended.journal);
+        // A resume asks somebody else.
+        let reader = gonio::journal::Reader::open(&folder.path()).unwrap();
+        assert_eq!(gonio::run::resume::rule_met(&reader.sessions().unwrap()), None);
+        assert!(reader.rounds().unwrap().is_empty());
+    }
 }

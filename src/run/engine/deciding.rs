@@ -1,7 +1,7 @@
 //! What others decide for the machine: whether a resume may go on, what is measured next, and that it
 //! is enough.
 
-use super::{Decided, Engine, Next};
+use super::{Decided, Engine, Fault, Next};
 use crate::journal::{EventKind, Record};
 use crate::run::events::Happening;
 use crate::run::machine::Input;
@@ -25,8 +25,15 @@ impl Engine<'_> {
     }
 
     /// A decision is kept before it is followed: a resume takes it up, and never makes it again.
-    pub(super) async fn decided(&mut self, decided: Decided) {
-        let Decided { number, account, next } = decided;
+    /// A run that nobody decides for stands still: it is not at its end.
+    pub(super) async fn decided(&mut self, decided: Result<Decided, String>) {
+        let Decided { number, account, next } = match decided {
+            Ok(decided) => decided,
+            Err(why) => {
+                let now = self.now();
+                return self.machine.handle(now, Input::Fault(Fault::Undecided(why)));
+            }
+        };
         let (steps, enough) = match next {
             Next::Measure(steps) => (steps, None),
             Next::Enough(why) => (Vec::new(), Some(why)),

@@ -272,8 +272,9 @@ impl Machine {
         }
         let wish = self.wish.take().map(|(after, _)| after);
         let after = wish.or_else(|| (self.state == State::Stopping).then(|| self.after.clone()));
-        let must_finish =
-            self.setup.on_fault == OnFault::Finish || matches!(fault, Fault::Journal(_));
+        // To continue would help neither; a resume does.
+        let is_for_good = matches!(fault, Fault::Journal(_) | Fault::Undecided(_));
+        let must_finish = self.setup.on_fault == OnFault::Finish || is_for_good;
         self.fault = Some(fault.clone());
         self.go(State::Faulted);
         match after {

@@ -40,11 +40,11 @@ pub(super) struct Between {
 
 impl Between {
     /// `None` where the sweeps are too few, or dark.
-    pub(super) fn new(terms: &Terms<'_>, scans: &[Scan], round: u32) -> Option<Self> {
+    pub(super) fn new(terms: &Terms, scans: &[Scan], round: u32) -> Option<Self> {
         let adaptive = terms.adaptive;
         let nodes =
             Nodes::of(terms.plan.region.theta_max_rad, adaptive.narrowest_feature_deg.to_radians());
-        let candidate = |i| adaptive.candidate(terms.plan, terms.rig, round * CANDIDATES + i);
+        let candidate = |i| adaptive.candidate(&terms.plan, &terms.rig, round * CANDIDATES + i);
         let candidates: Vec<Meridian> = (0..CANDIDATES).map(candidate).collect();
         let sides = if candidates[0].theta_rad.0 < 0.0 { 2 } else { 1 };
         let mut between = Self {
@@ -62,7 +62,7 @@ impl Between {
         (between.signal > 0.0).then_some(between)
     }
 
-    fn add(&mut self, terms: &Terms<'_>, scans: &[Scan], node: usize) -> Option<()> {
+    fn add(&mut self, terms: &Terms, scans: &[Scan], node: usize) -> Option<()> {
         let theta = self.nodes.thetas_rad[node];
         let knots = knots(terms, scans, &self.nodes, node);
         let narrowest = terms.adaptive.narrowest_feature_deg.to_radians();
@@ -109,12 +109,7 @@ impl Between {
 
     /// The sweeps that lessen the error the most for their time, one after the other as if those
     /// before were measured, until their time is used up.
-    pub(super) fn choose(
-        &mut self,
-        terms: &Terms<'_>,
-        here: Latched,
-        seconds: f64,
-    ) -> Vec<Meridian> {
+    pub(super) fn choose(&mut self, terms: &Terms, here: Latched, seconds: f64) -> Vec<Meridian> {
         let mut chosen: Vec<Meridian> = Vec::new();
         let mut stands = vec![here];
         let mut left_s = seconds;
@@ -149,7 +144,7 @@ impl Between {
     }
 
     /// Time to come to a candidate from the nearest of the places where the axes will have stood.
-    fn way_s(&self, terms: &Terms<'_>, stands: &[Latched], candidate: usize) -> f64 {
+    fn way_s(&self, terms: &Terms, stands: &[Latched], candidate: usize) -> f64 {
         let to = counts(terms, &self.candidates[candidate]);
         let time = |stand: &Latched| terms.rig.move_duration(*stand, to).as_secs_f64();
         stands.iter().map(time).fold(f64::INFINITY, f64::min)
@@ -159,7 +154,7 @@ impl Between {
     /// the time.
     fn best_part(
         &self,
-        terms: &Terms<'_>,
+        terms: &Terms,
         candidate: usize,
         way_s: f64,
     ) -> Option<(usize, usize, f64, f64)> {
@@ -218,7 +213,7 @@ impl Between {
     }
 }
 
-fn counts(terms: &Terms<'_>, meridian: &Meridian) -> Latched {
+fn counts(terms: &Terms, meridian: &Meridian) -> Latched {
     terms.rig.counts(AxisPositions([0.0, meridian.phi_rad, meridian.x_m, meridian.y_m]))
 }
 

@@ -22,7 +22,7 @@ pub(super) struct Checked {
 /// Fits what is not a check, in the basis that those readings ask for, and asks the checks.
 /// `mean_square` is that of the radiance over the region. An error is the fit's own.
 pub(super) fn checked(
-    terms: &Terms<'_>,
+    terms: &Terms,
     calibrated: &Calibrated,
     scans: &[Scan],
     mean_square: f64,

@@ -28,7 +28,7 @@ pub struct Gaps {
 
 impl Gaps {
     /// Of sweeps that reach the region's largest θ.
-    pub(super) fn of(terms: &Terms<'_>, scans: &[Scan]) -> Self {
+    pub(super) fn of(terms: &Terms, scans: &[Scan]) -> Self {
         let region = &terms.plan.region;
         let sin = libm::sin(region.theta_max_rad);
         let arc_deg = |phis: Vec<f64>| (widest(phis, TAU) * sin).to_degrees();

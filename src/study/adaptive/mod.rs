@@ -13,8 +13,11 @@ use std::collections::BTreeSet;
 
 use fit::{Optics, Region};
 use serde::{Deserialize, Serialize};
+use spanned_toml::Problem;
 
-use crate::plan::{Adaptive, After, Meridian, Plan, Prediction, Step, StepTime, SweepPace};
+use crate::plan::{
+    Adaptive, After, Meridian, Plan, Prediction, SWEEPS_MAX, Step, SweepPace, time_of,
+};
 use crate::rig::calibration::{Calibrated, calibrate};
 use crate::rig::{AxisPositions, Latched, Reading, Rig};
 use between::Between;
@@ -31,8 +34,6 @@ const SWEEPS_LEAST: f64 = 4.0;
 const SWEEPS_PER_CHECK: usize = 4;
 /// Checks at most: their names are known by where they are.
 const CHECKS_MAX: u32 = 400;
-/// Sweeps that are decided upon at most; the decision's time grows with their cube.
-const SWEEPS_MAX: usize = 300;
 /// The fit is asked once the interpolation's own error is no more than this many times the target.
 const FIT_FROM: f64 = 1.5;
 /// A fit that stays this far above what lies between the sweeps can't follow them ...
@@ -42,13 +43,13 @@ const STUCK_GAIN: f64 = 0.9;
 
 /// What a decision rests on beside the readings.
 #[derive(Debug, Clone)]
-pub struct Terms<'a> {
+pub struct Terms {
     /// The plan, whose schedule is an adaptive one.
-    pub plan: &'a Plan,
+    pub plan: Plan,
     /// Its terms.
-    pub adaptive: &'a Adaptive,
+    pub adaptive: Adaptive,
     /// The rig.
-    pub rig: &'a Rig,
+    pub rig: Rig,
     /// What the fit stands for.
     pub region: Region,
     /// What the detector sees.
@@ -104,20 +105,23 @@ pub enum Choice {
     Enough,
 }
 
-impl<'a> Terms<'a> {
-    /// `None` for plans whose schedule is fixed beforehand, or can't be flown at all.
+impl Terms {
+    /// `None` for plans whose schedule is fixed beforehand. The problem is one of the plan: sweeps
+    /// that the rig can't fly.
     pub fn new(
-        plan: &'a Plan,
-        rig: &'a Rig,
+        plan: &Plan,
+        rig: &Rig,
         region: Region,
         optics: Option<Optics>,
-    ) -> Option<Self> {
-        let pace = plan.sweep_pace(rig).ok()?;
-        Some(Self { plan, adaptive: plan.adaptive()?, rig, region, optics, pace })
+    ) -> Result<Option<Self>, Problem> {
+        let Some(adaptive) = plan.adaptive().copied() else { return Ok(None) };
+        let pace = plan.sweep_pace(rig)?;
+        let (plan, rig) = (plan.clone(), rig.clone());
+        Ok(Some(Self { plan, adaptive, rig, region, optics, pace }))
     }
 
     fn check(&self, j: u32) -> Meridian {
-        self.adaptive.check(self.plan, self.rig, j)
+        self.adaptive.check(&self.plan, &self.rig, j)
     }
 
     /// Where a sweep is, by the counts of turntable and stage: as a round lays it out, the table may
@@ -153,22 +157,50 @@ impl<'a> Terms<'a> {
 /// Decides. `readings` are those of the run's `steps`, in any order; `before` what was found after
 /// the rounds before, in order.
 pub fn decide(
-    terms: &Terms<'_>,
+    terms: &Terms,
     steps: &[Step],
     readings: &[Reading],
     before: &[Account],
 ) -> (Account, Choice) {
+    looked(terms, steps, readings, before, |state, account| state.judge(account, steps))
+        .unwrap_or_else(|account| (*account, Choice::Enough))
+}
+
+/// The last word on a run that something else ended, `why`, before it was decided: what its readings
+/// say by then. Of `steps` those count that have theirs.
+pub fn conclude(
+    terms: &Terms,
+    steps: &[Step],
+    readings: &[Reading],
+    before: &[Account],
+    why: &str,
+) -> Account {
+    let taken: BTreeSet<u32> = readings.iter().map(|reading| reading.id).collect();
+    let steps: Vec<Step> = steps.iter().filter(|step| taken.contains(&step.id)).copied().collect();
+    let last_word = |state: &mut State<'_>, account: &mut Account| {
+        account.verdict = Some(state.last_word(account, why.to_owned()));
+    };
+    let looked = looked(terms, &steps, readings, before, last_word);
+    looked.map_or_else(|account| *account, |(account, ())| account)
+}
+
+/// What readings show, and what is made of it; an account that ends the run where they show nothing.
+fn looked<T>(
+    terms: &Terms,
+    steps: &[Step],
+    readings: &[Reading],
+    before: &[Account],
+    judge: impl FnOnce(&mut State<'_>, &mut Account) -> T,
+) -> Result<(Account, T), Box<Account>> {
     let mut readings = readings.to_vec();
     readings.sort_by_key(|reading| reading.id);
     let round = u32::try_from(before.len()).unwrap_or(u32::MAX);
-    let rig_s = time_of(terms.rig, steps);
-    let calibrated = match calibrate(terms.rig, &readings) {
-        Ok(calibrated) => calibrated,
-        Err(error) => return nothing(terms, round, rig_s, &error.to_string()),
-    };
+    let rig_s = time_of(&terms.rig, Latched::ZERO, steps);
+    let calibrated = calibrate(&terms.rig, &readings)
+        .map_err(|error| nothing(terms, round, rig_s, &error.to_string()))?;
     let scans = scans(terms, steps, &calibrated);
     let Some(between) = Between::new(terms, &scans, round) else {
-        return nothing(terms, round, rig_s, "the sweeps so far show no light");
+        return Err(nothing(terms, round, rig_s, "the sweeps so far show no light"));
     };
     let mut account = Account {
         round: round + 1,
@@ -183,20 +215,23 @@ pub fn decide(
         gaps: Gaps::of(terms, &scans),
         verdict: None,
     };
+    let calibrated = &calibrated;
     let mut state =
-        State { terms, calibrated: &calibrated, scans: &scans, between, before, whole: None };
-    let choice = state.judge(&mut account, steps);
-    (account, choice)
+        State { terms, calibrated, scans: &scans, between, before, whole: None, is_asked: false };
+    let made = judge(&mut state, &mut account);
+    Ok((account, made))
 }
 
 struct State<'s> {
-    terms: &'s Terms<'s>,
+    terms: &'s Terms,
     calibrated: &'s Calibrated,
     scans: &'s [Scan],
     between: Between,
     before: &'s [Account],
     /// The fit of all readings, once it was asked for.
     whole: Option<fit::Fit>,
+    /// Whether fits were asked.
+    is_asked: bool,
 }
 
 impl State<'_> {
@@ -211,22 +246,26 @@ impl State<'_> {
             let wanted = self.next(steps);
             match wanted {
                 Ok(wanted) => return Choice::Measure(wanted),
-                Err(why) => {
-                    // What a person wants to know at the end, whatever it costs.
-                    if account.checked_relative.is_none() {
-                        self.ask_fit(account);
-                    }
-                    let largest = largest(account);
-                    ending = self.met(account).or(Some(Verdict { is_met: false, why, largest }));
-                }
+                Err(why) => ending = Some(self.last_word(account, why)),
             }
         }
         account.verdict = ending;
         Choice::Enough
     }
 
+    /// The verdict where nothing more is measured, whatever was reached: what a person wants to know
+    /// at the end, whatever it costs.
+    fn last_word(&mut self, account: &mut Account, why: String) -> Verdict {
+        if !self.is_asked {
+            self.ask_fit(account);
+        }
+        let largest = largest(account);
+        self.met(account).unwrap_or(Verdict { is_met: false, why, largest })
+    }
+
     /// What the checks, and the exitance's own uncertainty, say of a fit.
     fn ask_fit(&mut self, account: &mut Account) {
+        self.is_asked = true;
         if self.terms.adaptive.radiance_relative.is_some() {
             let mean_square = self.between.mean_square();
             // A fit that is refused says nothing yet; more sweeps determine it.
@@ -325,10 +364,10 @@ impl State<'_> {
         if self.scans.len() >= SWEEPS_MAX {
             return Err(format!("{} sweeps are as many as are decided upon", self.scans.len()));
         }
-        let after = After::steps(terms.rig, steps);
-        let so_far_s = time_of(terms.rig, steps);
+        let after = After::steps(&terms.rig, steps);
+        let so_far_s = time_of(&terms.rig, Latched::ZERO, steps);
         let most = terms.plan.stop.rig_time_max.map_or(f64::INFINITY, |most| most.as_secs_f64());
-        let left_s = most - Prediction::homing_s_of(terms.rig) - so_far_s;
+        let left_s = most - Prediction::homing_s_of(&terms.rig) - so_far_s;
         let span_rad = 2.0 * terms.plan.region.theta_max_rad;
         let sweep_s = terms.pace.around_s + span_rad * terms.pace.seconds_per_rad;
         let wanted_s = (GROWTH * so_far_s).max(SWEEPS_LEAST * sweep_s).min(left_s);
@@ -346,7 +385,7 @@ impl State<'_> {
         let mut checks = terms.further_checks(steps, (chosen.len() / SWEEPS_PER_CHECK).max(1));
         while !(chosen.is_empty() && checks.is_empty()) {
             let wanted: Vec<Meridian> = chosen.iter().chain(&checks).copied().collect();
-            match terms.plan.lay_out_round(terms.rig, after, &wanted) {
+            match terms.plan.lay_out_round(&terms.rig, after, &wanted) {
                 Ok(round) if round.seconds <= left_s => return Ok(wanted),
                 Ok(_) => {}
                 Err(problem) => return Err(format!("the rig can't fly what is wanted: {problem}")),
@@ -372,8 +411,8 @@ fn largest(account: &Account) -> Option<(String, f64)> {
 }
 
 /// Nothing can be decided.
-fn nothing(terms: &Terms<'_>, round: u32, rig_s: f64, why: &str) -> (Account, Choice) {
-    let account = Account {
+fn nothing(terms: &Terms, round: u32, rig_s: f64, why: &str) -> Box<Account> {
+    Box::new(Account {
         round: round + 1,
         sweeps: 0,
         checks: 0,
@@ -389,19 +428,7 @@ fn nothing(terms: &Terms<'_>, round: u32, rig_s: f64, why: &str) -> (Account, Ch
             why: format!("nothing can be decided: {why}"),
             largest: None,
         }),
-    };
-    (account, Choice::Enough)
-}
-
-/// Of steps that begin at home.
-fn time_of(rig: &Rig, steps: &[Step]) -> f64 {
-    let mut here = Latched::ZERO;
-    let mut seconds = 0.0;
-    for step in steps {
-        seconds += StepTime::of(rig, here, step).total_s();
-        here = step.rests_at(rig);
-    }
-    seconds
+    })
 }
 
 fn percent(part: f64) -> String {

@@ -60,28 +60,28 @@ impl Nodes {
 }
 
 /// Sweeps from their samples; what is saturated or unsettled is left out.
-pub(super) fn scans(terms: &Terms<'_>, steps: &[Step], calibrated: &Calibrated) -> Vec<Scan> {
+pub(super) fn scans(terms: &Terms, steps: &[Step], calibrated: &Calibrated) -> Vec<Scan> {
     let checks = terms.checks();
-    let mut scans: Vec<(u32, Scan)> = Vec::new();
+    // Long ones are flown in parts, each a sweep of its own: the way is what tells them apart.
+    let mut scans: Vec<([i32; 3], Scan)> = Vec::new();
     let sweep_of = |sample: &Sample| {
         let at = steps.binary_search_by_key(&sample.reading, |step| step.id).ok()?;
-        let step = &steps[at];
-        // Long ones are flown in parts.
+        let step = steps[at];
         let [_, phi, x, y] = step.counts.0;
-        Some((step.swept?.first, [phi, x, y]))
+        step.swept.map(|_| [phi, x, y])
     };
     for (place, sample) in calibrated.samples.iter().enumerate() {
         let is_bad =
             sample.flags.contains(Flag::Saturated) || sample.flags.contains(Flag::Unsettled);
-        let Some((first, counts)) = sweep_of(sample).filter(|_| !is_bad) else { continue };
+        let Some(counts) = sweep_of(sample).filter(|_| !is_bad) else { continue };
         let [arm_rad, phi_rad, x_m, y_m] = sample.positions.0;
         let variance = sample.u_independent * sample.u_independent;
         let point = Point { arm_rad, value: sample.value, variance, sample: place };
-        if let Some((_, scan)) = scans.iter_mut().rev().find(|(known, _)| *known == first) {
+        if let Some((_, scan)) = scans.iter_mut().rev().find(|(known, _)| *known == counts) {
             scan.points.push(point);
         } else {
             let is_check = checks.contains(&counts);
-            scans.push((first, Scan { phi_rad, x_m, y_m, is_check, points: vec![point] }));
+            scans.push((counts, Scan { phi_rad, x_m, y_m, is_check, points: vec![point] }));
         }
     }
     let mut scans: Vec<Scan> = scans.into_iter().map(|(_, scan)| scan).collect();
@@ -95,7 +95,7 @@ pub(super) fn scans(terms: &Terms<'_>, steps: &[Step], calibrated: &Calibrated) 
 impl Scan {
     /// The direction of an arm's angle as a place among others at the same θ: on a circle of radius
     /// sin θ, and on the sample in halves of the region.
-    pub(super) fn place(&self, terms: &Terms<'_>, arm_rad: f64) -> Place {
+    pub(super) fn place(&self, terms: &Terms, arm_rad: f64) -> Place {
         place(terms, arm_rad, self.phi_rad, self.x_m, self.y_m)
     }
 
@@ -115,7 +115,7 @@ impl Scan {
 }
 
 /// A place of [`fit::kriging`].
-pub(super) fn place(terms: &Terms<'_>, arm_rad: f64, phi_rad: f64, x_m: f64, y_m: f64) -> Place {
+pub(super) fn place(terms: &Terms, arm_rad: f64, phi_rad: f64, x_m: f64, y_m: f64) -> Place {
     let region = &terms.plan.region;
     let part = |(low, high): (f64, f64), at: f64| {
         let half = 0.5 * (high - low);
@@ -131,7 +131,7 @@ pub(super) fn place(terms: &Terms<'_>, arm_rad: f64, phi_rad: f64, x_m: f64, y_m
 }
 
 /// What the sweeps read at a node, on either side of the zenith, and the sweeps that did.
-pub(super) fn knots(terms: &Terms<'_>, scans: &[Scan], nodes: &Nodes, node: usize) -> Vec<Knot> {
+pub(super) fn knots(terms: &Terms, scans: &[Scan], nodes: &Nodes, node: usize) -> Vec<Knot> {
     let theta = nodes.thetas_rad[node];
     let both = |scan: &Scan| {
         [theta, -theta].map(|arm| {
