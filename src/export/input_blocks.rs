@@ -151,7 +151,8 @@ mod tests {
 
     #[test]
     fn a_quote_in_a_comment_or_amid_a_field_opens_nothing() {
-        let rows: String = (0..40).map(|i| format!("0,0,{i},0,1.5,\n")).collect();
+        let rows: Vec<String> = (0..40).map(|i| format!("0,0,{i},0,1.5,\n")).collect();
+        let rows = rows.concat();
         for odd in ["# 5\" across\n", "0,0,1,1,1.5,5\" across\n", "0,0,1,1,1.5,\"5\"\" across\"\n"]
         {
             let text = format!("# a lamp of 2\"\n{HEADER}{odd}{rows}{odd}");
