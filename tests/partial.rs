@@ -91,6 +91,7 @@ fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
         whole["notes"][1],
         "read in blocks, no sample kept: what single ones did is not listed"
     );
+    assert!(whole["notes"][2].as_str().unwrap().contains("(truncation)"), "{}", whole["notes"]);
     for key in ["coefficients", "covariance", "residual_rms", "n_used", "dof"] {
         assert_close(&share[key], &whole[key], 1e-6);
     }

@@ -326,6 +326,8 @@ fn fit_stream(
     let notes = [
         note_on_u(scan.has_u, args.u_relative),
         "read in blocks, no sample kept: what single ones did is not listed".to_owned(),
+        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
+            .to_owned(),
     ];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment =
@@ -356,7 +358,7 @@ fn write_and_show(args: &FitArgs, rays: Option<Vec<ListedRay>>, file: &FitFile<'
         write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
         if file.treatment.is_long() {
             write_atomically(&folder.join("weights.csv"), |out| {
-                write_weights(out, file.quantity, file.treatment)
+                write_weights(out, file.quantity, &file.fit.region().chart, file.treatment)
             })
             .map_err(Failure::midway)?;
         }

@@ -21,6 +21,7 @@ mod monte_carlo;
 mod nominal;
 mod outlook;
 mod output;
+mod parallel;
 mod partial;
 mod picture;
 mod plan;

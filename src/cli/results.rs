@@ -116,7 +116,7 @@ impl Results {
             let treatment = self.treatment(fitted);
             if treatment.is_long() {
                 write_atomically(&folder.join("weights.csv"), |out| {
-                    write_weights(out, quantity, &treatment)
+                    write_weights(out, quantity, &fitted.fit.region().chart, &treatment)
                 })?;
             }
         }

@@ -1,5 +1,6 @@
 //! Numbers and tables as people read them.
 
+pub(crate) use crate::study::percent;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
@@ -97,18 +98,6 @@ pub(crate) fn with_uncertainty(value: f64, u: f64, unit: &str) -> String {
     let scale = libm::exp10(f64::from(magnitude));
     let decimals = usize::try_from(1 - exponent + magnitude).unwrap_or(0);
     format!("({:.decimals$} ± {:.decimals$})e{magnitude}{unit}", value / scale, u / scale)
-}
-
-/// A relative number in per cent, to three digits.
-pub(crate) fn percent(relative: f64) -> String {
-    let percent = 100.0 * relative;
-    if percent == 0.0 {
-        return "0 %".to_owned();
-    }
-    let magnitude = libm::floor(libm::log10(percent.abs()));
-    #[allow(clippy::cast_possible_truncation)] // between -308 and 310
-    let decimals = usize::try_from(2 - magnitude as i32).unwrap_or(0);
-    format!("{percent:.decimals$} %")
 }
 
 #[cfg(test)]

@@ -35,16 +35,23 @@ pub(super) fn region_json(region: &Region) -> Value {
 
 /// A ray, by its chart's own coordinates.
 pub(super) fn ray_json(ray: Ray, chart: &Chart) -> Value {
-    let (theta_deg, phi_deg) = (ray.theta_rad.to_degrees(), ray.phi_rad.to_degrees());
+    let named = coordinates(ray, chart).into_iter();
+    Value::Object(named.map(|(name, value)| (name.to_owned(), json!(value))).collect())
+}
+
+/// The same as names with their units, and numbers.
+pub(super) fn coordinates(ray: Ray, chart: &Chart) -> Vec<(&'static str, f64)> {
+    let direction =
+        [("theta_deg", ray.theta_rad.to_degrees()), ("phi_deg", ray.phi_rad.to_degrees())];
     let (x_mm, y_mm) = (ray.x_m * 1e3, ray.y_m * 1e3);
     match *chart {
         Chart::Surface | Chart::Perpendicular { .. } => {
-            json!({"x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg, "phi_deg": phi_deg})
+            [("x_mm", x_mm), ("y_mm", y_mm)].into_iter().chain(direction).collect()
         }
-        Chart::Environment => json!({"theta_deg": theta_deg, "phi_deg": phi_deg}),
+        Chart::Environment => direction.to_vec(),
         Chart::TwoPlane { distance_m, .. } => {
             let (s_m, t_m) = ray.beyond(distance_m);
-            json!({"u_mm": x_mm, "v_mm": y_mm, "s_mm": s_m * 1e3, "t_mm": t_m * 1e3})
+            vec![("u_mm", x_mm), ("v_mm", y_mm), ("s_mm", s_m * 1e3), ("t_mm", t_m * 1e3)]
         }
     }
 }

@@ -118,11 +118,11 @@ impl FitFile<'_> {
         put("n_used", json!(fit.n_used()));
         put("n_flagged", json!(self.n_flagged));
         put("n_excluded", json!(self.n_excluded));
-        put("readings", self.treatment.readings());
+        put("readings", self.treatment.readings(&fit.region().chart));
         put("nuisances", self.treatment.fitted_along());
         put("drift", self.treatment.drift_json());
         put("symmetry", self.treatment.symmetry_json());
-        put("nonnegative", self.treatment.nonnegative_json());
+        put("nonnegative", self.treatment.nonnegative_json(&fit.region().chart));
         if !self.rounds.is_empty() {
             put("rounds", json!(self.rounds));
         }

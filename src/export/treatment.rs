@@ -3,10 +3,10 @@
 
 use std::io::{self, Write};
 
-use fit::{Fit, FittedNuisance, Nonnegative, Robust, SymmetryError, SymmetryTest};
+use fit::{Chart, Fit, FittedNuisance, Nonnegative, Robust, SymmetryError, SymmetryTest};
 use serde_json::{Value, json};
 
-use super::RayColumns;
+use super::charted::{coordinates, ray_json};
 use super::number::number;
 use crate::rig::Quantity;
 use crate::rig::calibration::FittedDrift;
@@ -187,19 +187,20 @@ impl<'a> Treatment<'a> {
         self.robust
     }
 
-    pub(super) fn readings(&self) -> Value {
+    pub(super) fn readings(&self, chart: &Chart) -> Value {
         let mut object = json!({"robust": self.robust.name()});
         for why in Why::ALL {
             let count = self.listed.iter().filter(|reading| reading.why == why).count();
             object[why.name()] = json!(count);
         }
         let listed = self.listed.iter().take(LISTED_MAX).map(|reading| {
-            let [x_mm, y_mm, theta_deg, phi_deg] = columns(&reading.ray);
-            json!({
-                "reading": reading.id, "x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg,
-                "phi_deg": phi_deg, "value": reading.value, "residual_over_u": reading.residual,
-                "weight": reading.weight, "why": reading.why.name(),
-            })
+            let mut listed = ray_json(reading.ray, chart);
+            listed["reading"] = json!(reading.id);
+            listed["value"] = json!(reading.value);
+            listed["residual_over_u"] = json!(reading.residual);
+            listed["weight"] = json!(reading.weight);
+            listed["why"] = json!(reading.why.name());
+            listed
         });
         object["listed"] = listed.collect();
         object
@@ -233,25 +234,15 @@ impl<'a> Treatment<'a> {
         }
     }
 
-    pub(super) fn nonnegative_json(&self) -> Value {
+    pub(super) fn nonnegative_json(&self, chart: &Chart) -> Value {
         let Some(bound) = self.nonnegative else { return Value::Null };
-        let ray = |ray: &fit::Ray| {
-            json!({
-                "x_mm": ray.x_m * 1e3, "y_mm": ray.y_m * 1e3,
-                "theta_deg": ray.theta_rad.to_degrees(), "phi_deg": ray.phi_rad.to_degrees(),
-            })
-        };
+        let ray = |ray: &fit::Ray| ray_json(*ray, chart);
         json!({
             "rays": bound.rays, "n_held": bound.held.len(), "least_before": bound.least,
             "exitance_change": bound.exitance,
             "held": bound.held.iter().take(LISTED_MAX).map(ray).collect::<Vec<Value>>(),
         })
     }
-}
-
-/// In the units of files.
-fn columns(ray: &fit::Ray) -> [f64; 4] {
-    [ray.x_m * 1e3, ray.y_m * 1e3, ray.theta_rad.to_degrees(), ray.phi_rad.to_degrees()]
 }
 
 fn tested(test: &SymmetryTest, is_used: bool) -> Value {
@@ -261,29 +252,59 @@ fn tested(test: &SymmetryTest, is_used: bool) -> Value {
     })
 }
 
-/// Writes weights.csv: every reading that is no plain one, the farthest off first.
+/// Writes weights.csv: every reading that is no plain one, the farthest off first, its ray by the
+/// chart's own coordinates.
 pub fn write_weights(
     out: impl Write,
     quantity: Quantity,
+    chart: &Chart,
     treatment: &Treatment<'_>,
 ) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    let [x, y, theta, phi] = RayColumns::NAMES;
+    let origin = fit::Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.0, phi_rad: 0.0 };
+    let names = coordinates(origin, chart).into_iter().map(|(name, _)| name);
     let radiance = quantity.radiance_column();
-    csv.write_record(["reading", x, y, theta, phi, radiance, "residual_over_u", "weight", "why"])?;
+    let header = ["reading"].into_iter().chain(names);
+    csv.write_record(header.chain([radiance, "residual_over_u", "weight", "why"]))?;
     for reading in &treatment.listed {
-        let [x, y, theta, phi] = columns(&reading.ray).map(number);
-        csv.write_record([
-            &reading.id.to_string(),
-            &x,
-            &y,
-            &theta,
-            &phi,
-            &number(reading.value),
-            &reading.residual.map_or_else(String::new, number),
-            &number(reading.weight),
-            reading.why.name(),
-        ])?;
+        let ray = coordinates(reading.ray, chart).into_iter().map(|(_, value)| number(value));
+        let record = [reading.id.to_string()].into_iter().chain(ray).chain([
+            number(reading.value),
+            reading.residual.map_or_else(String::new, number),
+            number(reading.weight),
+            reading.why.name().to_owned(),
+        ]);
+        csv.write_record(record)?;
     }
     csv.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_are_listed_by_their_charts_coordinates() {
+        let ray = fit::Ray { x_m: 2e-3, y_m: 0.0, theta_rad: 0.25, phi_rad: 0.0 };
+        let (id, value, why) = (7, 1.5, Why::Downweighted);
+        let reading = TreatedReading { id, ray, value, residual: Some(6.0), weight: 0.25, why };
+        let treatment = Treatment { listed: vec![reading], ..Treatment::default() };
+        let side = (0.0, 0.1);
+        let planes = Chart::TwoPlane { distance_m: 1.0, s_m: side, t_m: side };
+        for (chart, names, first) in [
+            (Chart::Surface, "x_mm,y_mm,theta_deg,phi_deg", "2,0,14.32"),
+            (Chart::Environment, "theta_deg,phi_deg", "14.32"),
+            (planes, "u_mm,v_mm,s_mm,t_mm", "2,0,257.34"),
+        ] {
+            let mut csv = Vec::new();
+            write_weights(&mut csv, Quantity::Radiance, &chart, &treatment).unwrap();
+            let csv = String::from_utf8(csv).unwrap();
+            let (head, row) = csv.split_once('\n').unwrap();
+            assert!(head.starts_with(&format!("reading,{names},radiance_w_per_m2_sr,")), "{head}");
+            assert!(row.starts_with(&format!("7,{first}")), "{row}");
+            let listed = &treatment.readings(&chart)["listed"][0];
+            assert!(names.split(',').all(|name| listed[name].is_number()), "{listed}");
+            assert_eq!(listed["x_mm"].is_null(), !names.contains("x_mm"));
+        }
+    }
 }

@@ -63,6 +63,16 @@ impl Plan {
     }
 }
 
+/// The hash of this module, of texts and files: of every part and its length.
+pub fn fnv1a64<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> u64 {
+    let mut hash = Fnv(OFFSET_BASIS);
+    for part in parts {
+        hash.integer(part.len() as u64);
+        hash.bytes(part);
+    }
+    hash.0
+}
+
 struct Fnv(u64);
 
 impl Fnv {

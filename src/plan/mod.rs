@@ -38,7 +38,7 @@ mod wanted;
 pub use adaptive::{Adaptive, SWEEPS_MAX};
 pub use cost::{Prediction, StepTime, TimeLeft, time_of};
 pub use expect::Expect;
-pub use hash::PlanHash;
+pub use hash::{PlanHash, fnv1a64};
 pub use rewrite::{Change, rewrite};
 pub use round::{After, Meridian, Round, SweepPace};
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};

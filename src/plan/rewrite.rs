@@ -45,20 +45,24 @@ impl Plan {
 /// The text with the changes made. A key that is not there is put at the end of its table, behind
 /// its last key; a table that is not there is added at the end.
 pub fn rewrite(text: &str, changes: &[Change]) -> String {
-    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    // What a line ends with before its line feed stays with it; new lines end as the first one does.
+    let body = text.strip_suffix('\n').unwrap_or(text);
+    let end =
+        if body.split('\n').next().is_some_and(|line| line.ends_with('\r')) { "\r" } else { "" };
+    let mut lines: Vec<String> = body.split('\n').map(str::to_owned).collect();
     for change in changes {
-        apply(&mut lines, change);
+        apply(&mut lines, change, end);
     }
     let mut text = lines.join("\n");
     text.push('\n');
     text
 }
 
-fn apply(lines: &mut Vec<String>, change: &Change) {
+fn apply(lines: &mut Vec<String>, change: &Change, end: &str) {
     let Some((from, to)) = span_of(lines, change.table) else {
         if let Some(value) = &change.value {
-            lines.extend([String::new(), format!("[{}]", change.table)]);
-            lines.push(format!("{} = {value}", change.key));
+            lines.extend([end.to_owned(), format!("[{}]{end}", change.table)]);
+            lines.push(format!("{} = {value}{end}", change.key));
         }
         return;
     };
@@ -71,7 +75,7 @@ fn apply(lines: &mut Vec<String>, change: &Change) {
         (None, Some(value)) => {
             let last = (from..to).rev().find(|&i| key_of(&lines[i]).is_some());
             let place = last.map_or(from, |last| last + 1);
-            lines.insert(place, format!("{} = {value}", change.key));
+            lines.insert(place, format!("{} = {value}{end}", change.key));
         }
         (None, None) => {}
     }
@@ -103,6 +107,7 @@ fn key_of(line: &str) -> Option<&str> {
 
 /// The line with another value; its comment stays where it is, if there is room.
 fn with_value(line: &str, key: &str, value: &str) -> String {
+    let (line, end) = line.strip_suffix('\r').map_or((line, ""), |line| (line, "\r"));
     let indent: String = line.chars().take_while(|c| c.is_whitespace()).collect();
     let mut new = format!("{indent}{key} = {value}");
     if let Some(at) = comment_of(line) {
@@ -111,6 +116,7 @@ fn with_value(line: &str, key: &str, value: &str) -> String {
         // Writing to a string does not fail.
         let _ = write!(new, "{:pad$}{}", "", &line[at..]);
     }
+    new.push_str(end);
     new
 }
 
@@ -161,7 +167,21 @@ mod tests {
     }
 
     #[test]
+    fn lines_end_as_they_did() {
+        let crlf = PLAN.replace('\n', "\r\n");
+        let changes = [
+            Change::set("dwell", "dwell_ms", 12.5),
+            Change::set("dwell", "gain", "\"1 uA\""),
+            Change::set("fit", "angular_degree", 6),
+            Change::set("expect", "beam_angle_deg", 40),
+        ];
+        assert_eq!(rewrite(&crlf, &changes), rewrite(PLAN, &changes).replace('\n', "\r\n"));
+    }
+
+    #[test]
     fn no_change_is_the_same_text() {
+        let mixed = PLAN.replacen('\n', "\r\n", 3);
+        assert_eq!(rewrite(&mixed, &[]), mixed);
         assert_eq!(rewrite(PLAN, &[]), PLAN);
     }
 }

@@ -1,7 +1,7 @@
 //! What accuracy costs in time: what many scored runs of the rungs say together. It does not know
 //! how a run is made.
 
-use super::Forecast;
+use super::{Forecast, median};
 use crate::plan::Prediction;
 
 /// One scored run. Errors are against the truth, relative, with their sign where it has one.
@@ -156,7 +156,8 @@ fn point<'a>(
     let spread = |value: fn(&FrontierRow) -> f64| {
         let mut values: Vec<f64> = rows.clone().map(value).collect();
         values.sort_by(f64::total_cmp);
-        [values[0], median(&values), values[values.len() - 1]]
+        let middle = median(values.iter().copied()).unwrap_or(values[0]);
+        [values[0], middle, values[values.len() - 1]]
     };
     let rms = |value: fn(&FrontierRow) -> f64| {
         let squares: Vec<f64> = rows.clone().map(|row| value(row) * value(row)).collect();
@@ -177,12 +178,6 @@ fn point<'a>(
         foretold: rows.clone().next().map_or(Foretold::NOTHING, |row| row.foretold),
         is_on_front: false,
     }
-}
-
-/// Of sorted values, at least one.
-fn median(sorted: &[f64]) -> f64 {
-    let middle = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
 /// A shape that errs by less errs by rounding, about which time decides nothing.

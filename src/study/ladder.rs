@@ -182,17 +182,11 @@ fn whole_micros(duration: Duration) -> Duration {
 
 #[cfg(test)]
 mod tests {
-    use spanned_toml::{Document, Source};
-
     use super::*;
+    use crate::study::plan_by;
 
     fn plan(schedule: &str) -> Plan {
-        let text = format!(
-            "[region]\nx_mm = [-1, 1]\ny_mm = [-1, 1]\ntheta_max_deg = 80\n[schedule]\n{schedule}\n\
-             [dwell]\ndwell_ms = 50\n[dark]\nmethod = \"shutter\"\n\
-             [fit]\nangular_degree = 2\nposition_degree = 0\n"
-        );
-        Plan::read(Document::parse(Source::new("plan.toml", &text)).unwrap()).unwrap()
+        plan_by(schedule, "angular_degree = 2\nposition_degree = 0")
     }
 
     #[test]

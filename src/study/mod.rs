@@ -9,12 +9,12 @@ mod demand;
 mod forecast;
 mod frontier;
 mod ladder;
+mod motion;
 mod nodes;
 mod parts;
 mod prior;
 mod score;
 mod search;
-mod strategy;
 mod trend;
 
 pub use demand::{Demand, Shortfall};
@@ -24,10 +24,22 @@ pub use frontier::{
     doubling, points,
 };
 pub use ladder::{LADDER, Rung};
+pub use motion::Motion;
 pub use nodes::{Fineness, Nodes};
 pub use parts::Budget;
 pub use prior::{Feature, Prior};
-pub use score::Score;
+pub use score::{Score, median, percent};
 pub use search::{Candidate, Considered, Found, Search, SearchError};
-pub use strategy::Strategy;
 pub use trend::{Reach, Trend};
+
+/// A small plan with this schedule and this fit.
+#[cfg(test)]
+fn plan_by(schedule: &str, fit: &str) -> crate::plan::Plan {
+    use spanned_toml::{Document, Source};
+
+    let text = format!(
+        "[region]\nx_mm = [-1, 1]\ny_mm = [-1, 1]\ntheta_max_deg = 80\n[schedule]\n{schedule}\n\
+         [dwell]\ndwell_ms = 50\n[dark]\nmethod = \"shutter\"\n[fit]\n{fit}\n"
+    );
+    crate::plan::Plan::read(Document::parse(Source::new("plan.toml", &text)).unwrap()).unwrap()
+}

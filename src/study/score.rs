@@ -55,6 +55,26 @@ impl Score {
     }
 }
 
+/// A relative number in per cent, to three digits.
+pub fn percent(relative: f64) -> String {
+    let percent = 100.0 * relative;
+    if percent == 0.0 {
+        return "0 %".to_owned();
+    }
+    let magnitude = libm::floor(libm::log10(percent.abs()));
+    #[allow(clippy::cast_possible_truncation)] // between -308 and 310
+    let decimals = usize::try_from(2 - magnitude as i32).unwrap_or(0);
+    format!("{percent:.decimals$} %")
+}
+
+/// The middle of numbers, the mean of the two in the middle of an even count; `None` of none.
+pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,7 @@ use std::time::Duration;
 use spanned_toml::{Problem, Source};
 
 use super::ladder::spacing;
-use super::{Demand, Forecast, ForecastError, Rung, Shortfall, Strategy};
+use super::{Demand, Forecast, ForecastError, Motion, Rung, Shortfall};
 use crate::plan::{Change, Plan, Schedule};
 use crate::rig::Rig;
 
@@ -181,7 +181,7 @@ impl Search<'_> {
     fn as_sweep(&self, plan: &Plan) -> Option<Vec<Change>> {
         let is_grid = matches!(plan.schedule, Schedule::CGamma { .. } | Schedule::Raster { .. });
         let is_known = self.plan.expect.narrowest_feature_rad.is_some();
-        if is_grid && is_known { Strategy::Sweep.changes(plan) } else { None }
+        if is_grid && is_known { Motion::Sweep.changes(plan) } else { None }
     }
 
     /// The variant with the shortest dwell that reaches all targets, or with the longest if none

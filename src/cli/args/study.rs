@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{EffectArgs, RigArgs};
-use crate::study::Strategy;
+use crate::study::Motion;
 
 /// On densities, dwells and speeds.
 const FACTORS: (f64, f64) = (0.01, 100.0);
@@ -23,7 +23,7 @@ pub(crate) struct FrontierArgs {
     /// be flown, and the plan's own. Of an adaptive one --density divides the error that is asked for,
     /// by its square root.
     #[arg(long = "strategy", value_name = "NAMES", value_delimiter = ',', value_parser = strategy)]
-    pub(crate) strategies: Vec<Strategy>,
+    pub(crate) strategies: Vec<Motion>,
     /// Factors on the number of targets, with commas between; every combination with --dwell and
     /// --speed is run. Default: a ladder of five rungs, from half to twice the plan's targets and
     /// dwell.
@@ -144,9 +144,9 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "expected a number of seconds above 0".to_owned())
 }
 
-fn strategy(text: &str) -> Result<Strategy, String> {
-    let named = Strategy::ALL.into_iter().find(|strategy| strategy.name() == text);
-    named.ok_or_else(|| format!("expected {}", Strategy::ALL.map(Strategy::name).join(" or ")))
+fn strategy(text: &str) -> Result<Motion, String> {
+    let named = Motion::ALL.into_iter().find(|strategy| strategy.name() == text);
+    named.ok_or_else(|| format!("expected one of {}", Motion::ALL.map(Motion::name).join(", ")))
 }
 
 fn factor(text: &str) -> Result<f64, String> {

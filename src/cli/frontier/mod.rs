@@ -3,11 +3,7 @@
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-
-use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use self::rungs::{Entry, entries};
 use super::acquire::{Acquired, Pace, acquire};
@@ -15,6 +11,7 @@ use super::args::FrontierArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::create;
 use super::output::{say, write_out};
+use super::parallel::in_parallel;
 use super::results::Results;
 use super::run::first_job;
 use super::session::utc_stamp;
@@ -85,34 +82,19 @@ fn write(
 fn run_all(entries: &[Entry], folder: &Path, seeds: u64) -> Result<Vec<FrontierRow>, Failure> {
     let runs: Vec<(usize, u64)> =
         (0..entries.len()).flat_map(|entry| (0..seeds).map(move |k| (entry, k))).collect();
-    let bar = ProgressBar::with_draw_target(
-        Some(runs.len() as u64),
-        ProgressDrawTarget::stderr_with_hz(5),
-    );
-    let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<(usize, Result<FrontierRow, Failure>)>> = Mutex::default();
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(runs.len()) {
-            scope.spawn(|| {
-                loop {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(&(i, k)) = runs.get(place) else { break };
-                    let folder = folder.join("runs").join(format!("rung{i}-seed{}", 1 + k));
-                    let row = run_one(&entries[i], &folder, k);
-                    bar.inc(1);
-                    // A thread that panicked has ended the program's work already.
-                    if let Ok(mut done) = done.lock() {
-                        done.push((place, row));
-                    }
-                }
-            });
-        }
+    let rows = in_parallel(&runs, |(i, k)| {
+        let folder = folder.join("runs").join(format!("rung{i}-seed{}", 1 + k));
+        run_one(&entries[*i], &folder, *k)
     });
-    bar.finish_and_clear();
-    let mut done = done.into_inner().unwrap_or_default();
-    done.sort_by_key(|(place, _)| *place);
-    done.into_iter().map(|(_, row)| row).collect()
+    let row = |(run, row): (&(usize, u64), Option<Result<FrontierRow, Failure>>)| {
+        let entry = &entries[run.0];
+        let lost = || {
+            let (motion, rung) = (entry.motion.name(), entry.parameters());
+            Failure::midway(format!("{motion}, {rung}: a thread panicked"))
+        };
+        row.unwrap_or_else(|| Err(lost()))
+    };
+    runs.iter().zip(rows).map(row).collect()
 }
 
 fn run_one(entry: &Entry, folder: &Path, k: u64) -> Result<FrontierRow, Failure> {
@@ -141,7 +123,7 @@ fn row(
     began: Instant,
 ) -> Result<FrontierRow, Failure> {
     let fitted = results.fitted.as_ref().map_err(|error| {
-        let (strategy, rung) = (entry.strategy.name(), entry.rung.parameters());
+        let (strategy, rung) = (entry.motion.name(), entry.rung.parameters());
         Failure::midway(format!("{strategy}, {rung}: fit: {error}"))
     })?;
     let (truth, score) = results.truth.zip(results.score).ok_or_else(|| {
@@ -155,7 +137,7 @@ fn row(
     };
     Ok(FrontierRow {
         scene: setup.plan_name.clone(),
-        strategy: entry.strategy.name().to_owned(),
+        strategy: entry.motion.name().to_owned(),
         parameters: entry.parameters(),
         seed: setup.seed,
         rig_s,

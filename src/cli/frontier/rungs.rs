@@ -7,14 +7,14 @@ use crate::cli::outlook::outlook;
 use crate::cli::output::note;
 use crate::cli::setup::Setup;
 use crate::journal::EffectWishes;
-use crate::study::{Foretold, LADDER, Rung, Strategy};
+use crate::study::{Foretold, LADDER, Motion, Rung};
 
 /// Plans of a frontier at most.
 const RUNGS_MAX: usize = 500;
 
 /// One plan of the frontier.
 pub(super) struct Entry {
-    pub(super) strategy: Strategy,
+    pub(super) motion: Motion,
     pub(super) rung: Rung,
     /// With the first seed.
     pub(super) setup: Setup,
@@ -41,20 +41,20 @@ fn parameters(rung: Rung, wishes: &EffectWishes) -> String {
 /// ends it here; a rung of another is left out, and said to be.
 pub(super) fn entries(setup: &Setup, args: &FrontierArgs) -> Result<Vec<Entry>, Failure> {
     let mut entries = Vec::new();
-    for strategy in Strategy::ALL {
-        let is_own = strategy == Strategy::of(&setup.plan.schedule);
-        let is_asked = args.strategies.contains(&strategy);
+    for motion in Motion::ALL {
+        let is_own = motion == Motion::of(&setup.plan.schedule);
+        let is_asked = args.strategies.contains(&motion);
         // What decides by itself takes its time to: only where it is asked for.
-        let is_default = args.strategies.is_empty() && (is_own || strategy != Strategy::Adaptive);
+        let is_default = args.strategies.is_empty() && (is_own || motion != Motion::Adaptive);
         if !(is_asked || is_default) {
             continue;
         }
-        for rung in rungs(args, strategy)? {
-            match entry(setup, strategy, rung) {
+        for rung in rungs(args, motion)? {
+            match entry(setup, motion, rung) {
                 Ok(entry) => entries.push(entry),
                 Err(failure) if is_own || is_asked => return Err(failure),
                 Err(failure) => {
-                    let (name, rung) = (strategy.name(), rung.parameters());
+                    let (name, rung) = (motion.name(), rung.parameters());
                     note(&format!("left out: {name}, {rung}\n{}", failure.text()));
                 }
             }
@@ -64,14 +64,14 @@ pub(super) fn entries(setup: &Setup, args: &FrontierArgs) -> Result<Vec<Entry>, 
 }
 
 /// The ladder, or every combination of the factors that were given.
-fn rungs(args: &FrontierArgs, strategy: Strategy) -> Result<Vec<Rung>, Failure> {
+fn rungs(args: &FrontierArgs, motion: Motion) -> Result<Vec<Rung>, Failure> {
     let FrontierArgs { densities, dwells, speeds, .. } = args;
     if densities.is_empty() && dwells.is_empty() && speeds.is_empty() {
         return Ok(LADDER.to_vec());
     }
     let or_itself = |factors: &[f64]| if factors.is_empty() { vec![1.0] } else { factors.to_vec() };
     // Who stands still has no speed: one rung for all of them.
-    let speeds = if strategy == Strategy::Sweep { or_itself(speeds) } else { vec![1.0] };
+    let speeds = if motion == Motion::Sweep { or_itself(speeds) } else { vec![1.0] };
     let mut rungs = Vec::new();
     for density in or_itself(densities) {
         for dwell in or_itself(dwells) {
@@ -87,9 +87,9 @@ fn rungs(args: &FrontierArgs, strategy: Strategy) -> Result<Vec<Rung>, Failure> 
     Ok(rungs)
 }
 
-fn entry(setup: &Setup, strategy: Strategy, rung: Rung) -> Result<Entry, Failure> {
-    let name = strategy.name();
-    let changes = strategy.changes(&setup.plan).ok_or_else(|| {
+fn entry(setup: &Setup, motion: Motion, rung: Rung) -> Result<Entry, Failure> {
+    let name = motion.name();
+    let changes = motion.changes(&setup.plan).ok_or_else(|| {
         Failure::with_help(
             format!("{name}: the plan's schedule does not say what that needs"),
             "a list of poses has no meridians to fly along, an adaptive schedule no grid: give a plan \
@@ -103,10 +103,10 @@ fn entry(setup: &Setup, strategy: Strategy, rung: Rung) -> Result<Entry, Failure
         )
     })?;
     let setup = setup.with_plan(plan, setup.seed)?;
-    let is_sweep = strategy != Strategy::StopAndGo;
+    let is_sweep = motion != Motion::StopAndGo;
     let foretold =
         Foretold::of(is_sweep, &setup.sequence.prediction, outlook(&setup).ok().as_ref());
-    Ok(Entry { strategy, rung, setup, foretold })
+    Ok(Entry { motion, rung, setup, foretold })
 }
 
 #[cfg(test)]

@@ -8,12 +8,12 @@ use std::process::ExitCode;
 use radiometry::quadrature::gauss_legendre;
 
 use super::document::{Document, section, summary};
-use super::parallel::in_parallel;
 use crate::cli::acquire::{Acquired, Pace, acquire};
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::folder::create;
 use crate::cli::output::{note, say, write_out};
+use crate::cli::parallel::in_parallel;
 use crate::cli::results::{fit_of, fit_region};
 use crate::cli::run::first_job;
 use crate::cli::session::utc_stamp;

@@ -3,7 +3,6 @@
 mod cost;
 mod coverage;
 mod document;
-mod parallel;
 
 pub(crate) use cost::cost;
 pub(crate) use coverage::coverage;

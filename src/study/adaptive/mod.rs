@@ -20,6 +20,7 @@ use crate::plan::{
 };
 use crate::rig::calibration::{Calibrated, calibrate};
 use crate::rig::{AxisPositions, Latched, Reading, Rig};
+use crate::study::percent;
 use between::Between;
 use checked::{Checked, checked};
 use scans::{Scan, scans};
@@ -429,8 +430,4 @@ fn nothing(terms: &Terms, round: u32, rig_s: f64, why: &str) -> Box<Account> {
             largest: None,
         }),
     })
-}
-
-fn percent(part: f64) -> String {
-    format!("{:.3} %", 100.0 * part)
 }

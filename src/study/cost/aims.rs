@@ -1,6 +1,7 @@
 //! What shall be reached, and whether it is.
 
-use super::{Compared, Reached, Run, Scene, Strategy, Target, compared, median};
+use super::{Compared, Reached, Run, Scene, Strategy, Target, compared};
+use crate::study::median;
 
 /// An aim, with what was found.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,6 +11,6 @@ mod verdict;
 
 pub use aims::{Aim, aims};
 pub use interpolant::{NoGrid, interpolate};
-pub use rung::{Motion, Rung, Strategy, ladder};
+pub use rung::{Rung, Strategy, ladder};
 pub use scene::{Scene, SceneFiles};
-pub use verdict::{Climb, Compared, Reached, Run, Target, compared, median};
+pub use verdict::{Climb, Compared, Reached, Run, Target, compared};

@@ -3,16 +3,7 @@
 
 use std::fmt::Write as _;
 
-/// How readings are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Motion {
-    /// The axes at rest, on a raster.
-    StopAndGo,
-    /// In windows while the arm flies along a meridian.
-    Sweep,
-    /// In flight where the readings so far ask for it, until the run itself believes that it is done.
-    Adaptive,
-}
+use crate::study::Motion;
 
 /// How readings are taken, and what is made of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,11 +18,6 @@ pub enum Strategy {
     FlightFitted,
     /// Sweeps that the readings decide upon, fitted.
     AdaptiveFitted,
-}
-
-impl Motion {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::StopAndGo, Self::Sweep, Self::Adaptive];
 }
 
 impl Strategy {

@@ -2,6 +2,7 @@
 //! compare, with the scene known beforehand and without.
 
 use super::{Rung, Scene, Strategy};
+use crate::study::median;
 
 /// What is asked of a run, once the factor that fits the truth best is taken out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,15 +73,6 @@ impl Target {
         median(runs.iter().map(error)).is_some_and(|error| error <= most)
     }
 }
-
-/// The middle of numbers, the mean of the two in the middle of an even count; `None` of none.
-pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
-}
-
 /// When a strategy met a target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reached {

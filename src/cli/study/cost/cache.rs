@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::cli::failure::Failure;
 use crate::export::write_atomically;
+use crate::plan::fnv1a64;
 use crate::study::cost::{Run, Rung, Scene, SceneFiles, Strategy};
 
 /// Where runs are kept, if anywhere.
@@ -16,12 +17,25 @@ pub(super) struct Cache<'a> {
 
 /// All that a run depends on.
 pub(super) struct Key<'a> {
+    /// Which build made it: another one may fit otherwise.
+    pub(super) program: &'a str,
     pub(super) scene: Scene,
     pub(super) files: &'a SceneFiles,
     pub(super) rig: &'a str,
     pub(super) plan: &'a str,
     pub(super) seed: u64,
     pub(super) strategy: Strategy,
+}
+
+/// Names this build of the program, by its own file's bytes: what a run comes to depends on nearly all
+/// of them.
+pub(super) fn program() -> Result<String, Failure> {
+    let path = std::env::current_exe();
+    let bytes = path.and_then(std::fs::read);
+    let bytes = bytes.map_err(|error| {
+        Failure::start(format!("--cache: this program's own file can't be read: {error}"))
+    })?;
+    Ok(format!("{:016x}", fnv1a64([&bytes[..]])))
 }
 
 impl<'a> Cache<'a> {
@@ -88,7 +102,7 @@ impl Key<'_> {
     /// What can be compared by eye; the rest is in the hash.
     fn says(&self) -> Value {
         json!({
-            "version": env!("CARGO_PKG_VERSION"),
+            "program": self.program,
             "scene": self.scene.name(),
             "strategy": self.strategy.name(),
             "seed": self.seed,
@@ -97,29 +111,22 @@ impl Key<'_> {
         })
     }
 
-    /// FNV-1a, 64 bits (Fowler, Noll and Vo 1991), of every part and its length.
     fn hash(&self) -> u64 {
-        let says = [env!("CARGO_PKG_VERSION"), self.strategy.name(), self.scene.name()];
+        let says = [self.program, self.strategy.name(), self.scene.name()];
         let texts = says.into_iter().chain([self.plan, self.rig, &self.files.text]);
         let texts = texts.map(str::as_bytes);
         let seed = self.seed.to_le_bytes();
         let attached = self.files.attachments.iter().map(|attachment| &attachment.bytes[..]);
         let parts = texts.chain([&seed[..]]).chain(attached);
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for part in parts {
-            let length = part.len().to_le_bytes();
-            for byte in length.iter().chain(part) {
-                hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-            }
-        }
-        hash
+        fnv1a64(parts)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::cost::{Motion, ladder};
+    use crate::study::Motion;
+    use crate::study::cost::ladder;
 
     #[test]
     fn a_kept_run_is_found_again_and_nothing_else_is() {
@@ -128,14 +135,17 @@ mod tests {
         let rung = ladder(Motion::Sweep, false)[3];
         let (files, plan) = (Scene::Batwing.files(""), rung.plan());
         let strategy = Strategy::FlightFitted;
-        let key = |seed, rig| Key {
-            scene: Scene::Batwing,
+        let scene = Scene::Batwing;
+        let of = |program, seed, rig| Key {
+            program,
+            scene,
             files: &files,
             rig,
             plan: &plan,
             seed,
             strategy,
         };
+        let key = |seed, rig| of("this", seed, rig);
         let run = Run {
             scene: Scene::Batwing,
             strategy,
@@ -157,6 +167,7 @@ mod tests {
         assert_eq!(cache.find(&key(7, "rig"), rung), Some(run.clone()));
         assert_eq!(cache.find(&key(8, "rig"), rung), None);
         assert_eq!(cache.find(&key(7, "other"), rung), None);
+        assert_eq!(cache.find(&of("one with another fit", 7, "rig"), rung), None);
         // Nowhere to keep it is no error.
         Cache::new(None).keep(&key(7, "rig"), &run).unwrap();
     }

@@ -4,16 +4,18 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use self::cache::program;
 use self::one::Bench;
 use super::document::Document;
-use super::parallel::in_parallel;
 use crate::cli::args::CostArgs;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::output::{note, say, say_json};
+use crate::cli::parallel::in_parallel;
 use crate::cli::session::utc_stamp;
 use crate::export::{ExportError, write_atomically, write_cost, write_reached};
 use crate::rig::Rig;
-use crate::study::cost::{Aim, Climb, Motion, Reached, Run, Rung, Scene, Strategy, aims, ladder};
+use crate::study::Motion;
+use crate::study::cost::{Aim, Climb, Reached, Run, Rung, Scene, Strategy, aims, ladder};
 
 mod cache;
 mod one;
@@ -136,6 +138,7 @@ fn named<T: Copy, const N: usize>(
 /// Every scene by every motion, as many at once as there are threads.
 fn study(asked: Asked, work: &Path, cache: Option<&Path>) -> Result<Found, Failure> {
     let rig = Rig::built_in()?.document().source().text().to_owned();
+    let program = cache.map_or(Ok(String::new()), |_| program())?;
     // The dear ones first, so that no thread is left with one of them in the end.
     let motions = Motion::ALL.into_iter().rev();
     let entries: Vec<(Scene, Motion)> = motions
@@ -143,7 +146,7 @@ fn study(asked: Asked, work: &Path, cache: Option<&Path>) -> Result<Found, Failu
         .filter(|(_, motion)| asked.strategies.iter().any(|s| s.motion() == *motion))
         .collect();
     let done = in_parallel(&entries, |(scene, motion)| {
-        let bench = Bench::new(*scene, &rig, work, cache);
+        let bench = Bench::new(*scene, &rig, work, &program, cache);
         climb(&asked, &bench, *motion)
     });
     let (mut runs, mut reached) = (Vec::new(), Vec::new());

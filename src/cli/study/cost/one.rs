@@ -29,6 +29,7 @@ pub(super) struct Bench<'a> {
     rig: &'a str,
     /// Where journals are kept while they are written.
     work: &'a Path,
+    program: &'a str,
     cache: Cache<'a>,
     truth: OnceCell<Truth>,
 }
@@ -58,9 +59,17 @@ struct Acquisition {
 }
 
 impl<'a> Bench<'a> {
-    pub(super) fn new(scene: Scene, rig: &'a str, work: &'a Path, cache: Option<&'a Path>) -> Self {
+    /// `program` names the build, for the cache.
+    pub(super) fn new(
+        scene: Scene,
+        rig: &'a str,
+        work: &'a Path,
+        program: &'a str,
+        cache: Option<&'a Path>,
+    ) -> Self {
         let files = scene.files(PHOTOMETRIC);
-        Self { scene, files, rig, work, cache: Cache::new(cache), truth: OnceCell::new() }
+        let (cache, truth) = (Cache::new(cache), OnceCell::new());
+        Self { scene, files, rig, work, program, cache, truth }
     }
 
     pub(super) fn scene(&self) -> Scene {
@@ -88,7 +97,7 @@ impl<'a> Bench<'a> {
         let mut runs = Vec::new();
         for &strategy in strategies {
             let (scene, files, rig) = (self.scene, &self.files, self.rig);
-            let key = Key { scene, files, rig, plan: &plan, seed, strategy };
+            let key = Key { program: self.program, scene, files, rig, plan: &plan, seed, strategy };
             if let Some(run) = self.cache.find(&key, *rung) {
                 runs.push(run);
                 continue;

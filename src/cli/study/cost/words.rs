@@ -9,7 +9,8 @@ use super::{Asked, Found, NAME};
 use crate::cli::study::document::Document;
 use crate::cli::text::{percent, table};
 use crate::report::{Chart, Series, Stroke};
-use crate::study::cost::{Aim, Compared, Reached, Scene, Strategy, Target, compared, median};
+use crate::study::cost::{Aim, Compared, Reached, Scene, Strategy, Target, compared};
+use crate::study::median;
 
 /// Targets in the radiance come first.
 const OF_RADIANCE: usize = 3;
@@ -26,6 +27,11 @@ pub(super) fn summary(found: &Found) -> String {
         let _ = writeln!(text, "  {}: {}: {}", yes_or_no(aim), aim.text, aim.found);
     }
     text
+}
+
+/// So many seeds, and what they do.
+fn counted(seeds: u64, one: &str, many: &str) -> String {
+    if seeds == 1 { format!("1 seed {one}") } else { format!("{seeds} seeds {many}") }
 }
 
 /// For the document: Markdown.
@@ -46,7 +52,9 @@ pub(super) fn section(found: &Found, document: &Document) -> String {
          by leaving out sweeps, each reading the mean over its beam and its way.\n\
          - L: RMS error of the radiance over region and directions, weighted with cos θ dω dA. M: error \
          of the exitance into 80°. Both after the factor common to all readings was taken out.\n\n\
-         {seeds} seeds place a rung, {quoted_seeds} are quoted.",
+         {} a rung, {} quoted.",
+        counted(seeds, "places", "place"),
+        counted(quoted_seeds, "is", "are"),
     );
     if longest_s.is_finite() {
         let _ = write!(text, " Rungs of more than {longest_s} s were left out.");

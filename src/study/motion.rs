@@ -4,8 +4,8 @@
 use crate::plan::{Change, Plan, Schedule};
 
 /// How a plan takes its readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Strategy {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Motion {
     /// A reading at a time, the axes at rest.
     StopAndGo,
     /// In windows while the arm flies along a meridian.
@@ -23,7 +23,7 @@ const PLACES: usize = 2;
 const RADIANCE_RELATIVE: f64 = 0.02;
 const RIG_TIME_S: f64 = 7200.0;
 
-impl Strategy {
+impl Motion {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::StopAndGo, Self::Sweep, Self::Adaptive];
 
@@ -102,8 +102,8 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
 /// The places of a grid or of sweeps, and the narrowest feature that they resolve; as long as it takes,
 /// within reason.
 fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
-    let flown = match Strategy::of(&plan.schedule) {
-        Strategy::Sweep => plan.clone(),
+    let flown = match Motion::of(&plan.schedule) {
+        Motion::Sweep => plan.clone(),
         _ => plan.changed(&sweeps(plan)?)?,
     };
     let Schedule::Sweep { x_count, y_count, phi_step_deg, narrowest_feature_deg, .. } =
@@ -156,20 +156,14 @@ fn grid(plan: &Plan) -> Option<Vec<Change>> {
 
 #[cfg(test)]
 mod tests {
-    use spanned_toml::{Document, Source};
-
     use super::*;
+    use crate::study::plan_by;
 
     fn plan(schedule: &str) -> Plan {
-        let text = format!(
-            "[region]\nx_mm = [-1, 1]\ny_mm = [-1, 1]\ntheta_max_deg = 80\n[schedule]\n{schedule}\n\
-             [dwell]\ndwell_ms = 50\n[dark]\nmethod = \"shutter\"\n\
-             [fit]\nangular_degree = 8\nposition_degree = 2\n"
-        );
-        Plan::read(Document::parse(Source::new("plan.toml", &text)).unwrap()).unwrap()
+        plan_by(schedule, "angular_degree = 8\nposition_degree = 2")
     }
 
-    fn into(strategy: Strategy, plan: &Plan) -> Schedule {
+    fn into(strategy: Motion, plan: &Plan) -> Schedule {
         plan.changed(&strategy.changes(plan).unwrap()).unwrap().schedule
     }
 
@@ -178,7 +172,7 @@ mod tests {
         let raster = plan(
             "kind = \"raster\"\nx_count = 2\ny_count = 3\ntheta_step_deg = 5\nphi_step_deg = 30",
         );
-        let flown = into(Strategy::Sweep, &raster);
+        let flown = into(Motion::Sweep, &raster);
         let expected = Schedule::Sweep {
             x_count: 2,
             y_count: 3,
@@ -191,13 +185,13 @@ mod tests {
             "kind = \"sweep\"\nx_count = 2\ny_count = 3\nphi_step_deg = 30\nnarrowest_feature_deg = 10\n\
              window_ms = 5",
         );
-        assert_eq!(into(Strategy::StopAndGo, &sweep), raster.schedule);
+        assert_eq!(into(Motion::StopAndGo, &sweep), raster.schedule);
     }
 
     #[test]
     fn poses_that_fill_the_region_fly_as_the_fit_needs() {
         let plan = plan("kind = \"low-discrepancy\"\ncount = 500");
-        let Schedule::Sweep { x_count, y_count, phi_step_deg, .. } = into(Strategy::Sweep, &plan)
+        let Schedule::Sweep { x_count, y_count, phi_step_deg, .. } = into(Motion::Sweep, &plan)
         else {
             panic!("a sweep");
         };
@@ -210,18 +204,18 @@ mod tests {
             "kind = \"raster\"\nx_count = 2\ny_count = 3\ntheta_step_deg = 5\nphi_step_deg = 30\n\
              order = \"listed\"\nrepeat = 2",
         );
-        let changed = raster.changed(&Strategy::Adaptive.changes(&raster).unwrap()).unwrap();
+        let changed = raster.changed(&Motion::Adaptive.changes(&raster).unwrap()).unwrap();
         let adaptive = changed.adaptive().unwrap();
         assert_eq!((adaptive.x_count, adaptive.y_count), (2, 3));
         assert!((adaptive.narrowest_feature_deg - 10.0).abs() < 1e-12);
         assert!(changed.stop.rig_time_max.is_some());
-        assert_eq!(Strategy::Sweep.changes(&changed), None);
+        assert_eq!(Motion::Sweep.changes(&changed), None);
     }
 
     #[test]
     fn a_list_can_not_fly_and_stays_what_it_is() {
         let list = plan("kind = \"list\"\nfile = \"poses.csv\"");
-        assert_eq!(Strategy::Sweep.changes(&list), None);
-        assert_eq!(Strategy::StopAndGo.changes(&list), Some(Vec::new()));
+        assert_eq!(Motion::Sweep.changes(&list), None);
+        assert_eq!(Motion::StopAndGo.changes(&list), Some(Vec::new()));
     }
 }
