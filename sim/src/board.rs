@@ -84,6 +84,14 @@ impl SimulatedBoard {
         self.compiled.drawn.kinematics.seen(core::array::from_fn(|axis| self.axes[axis].value(now)))
     }
 
+    /// Puts an absolute encoder on an axis: its counts are from the home mark, wherever it stands
+    /// at boot. Where the mark stands is as uncertain as where a search finds it.
+    pub fn know_home(&mut self, channel: u8) {
+        if let Some(axis) = self.axis(channel) {
+            axis.know_home();
+        }
+    }
+
     fn axis(&mut self, channel: u8) -> Option<&mut Axis> {
         let axis = *self.axis_of_channel.get(usize::from(channel))?;
         self.axes.get_mut(axis)

@@ -16,6 +16,7 @@ mod chance;
 mod check;
 mod compile;
 mod detector;
+mod dynamixel;
 mod effect;
 mod field;
 mod levels;
@@ -40,6 +41,7 @@ pub use bench::Bench;
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
 pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
+pub use dynamixel::{DynamixelBus, ServoFault, ServoSetting};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use field::Ray;
 pub use mechanics::{

@@ -1,3 +1,5 @@
+//! What could break on a bench: a line whose bytes come early, late or out of order.
+
 use std::sync::Arc;
 use std::time::Duration;
 
