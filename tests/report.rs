@@ -9,11 +9,13 @@ use bench::Bench;
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
 
-const PICTURES: [&str; 10] = [
+const PICTURES: [&str; 12] = [
     "polar",
     "hemisphere",
     "plane",
     "budget",
+    "budget-intensity",
+    "budget-peak",
     "accuracy",
     "residuals-theta",
     "residuals-time",
@@ -215,7 +217,9 @@ fn what_files_say_is_shown_as_they_say_it_and_does_nothing() {
     let page = bench.text("out/report.html");
     let document = parsed(&page);
     check_self_contained(&document);
-    assert_eq!(document.descendants().filter(|n| n.tag_name().name() == "b").count(), 10);
+    // Each picture's title, and nothing else.
+    let bold = document.descendants().filter(|n| n.tag_name().name() == "b").count();
+    assert_eq!(bold, PICTURES.len());
     let cells = document.descendants().filter(|n| n.tag_name().name() == "td").map(text_of);
     assert!(cells.into_iter().any(|cell| cell == "<b onclick='x'>&\"rig (simulated)"));
 }

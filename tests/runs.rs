@@ -112,6 +112,17 @@ fn check_fit(bench: &Bench, example: &str) {
     ] {
         assert!(fit.get(key).is_some(), "{example}: no {key}");
     }
+    for key in ["exitance_w_per_m2", "flux_w", "intensity_on_axis_w_per_sr", "peak_radiance"] {
+        let squares = |budget: &str| -> f64 {
+            let rows = fit[key][budget].as_array().unwrap();
+            rows.iter().map(|row| row["u"].as_f64().unwrap().powi(2)).sum()
+        };
+        let u = number(&fit, &format!("/{key}/u"));
+        assert!((squares("budget") / (u * u) - 1.0).abs() < 1e-9, "{example} {key}");
+        let independent = fit[key]["budget"][0]["u"].as_f64().unwrap().powi(2);
+        let part = squares("budget_independent") / independent;
+        assert!((part - 1.0).abs() < 0.021, "{example} {key}: {part}");
+    }
     for key in ["exitance_w_per_m2", "exitance_within_region_w_per_m2", "flux_w", "peak_radiance"] {
         let (value, u) =
             (number(&fit, &format!("/{key}/value")), number(&fit, &format!("/{key}/u")));

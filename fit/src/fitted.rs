@@ -162,7 +162,7 @@ impl Fit {
         self.weighed.as_ref()
     }
 
-    /// What each sample did to the exitance; `None` of a fit that was stored and taken up again.
+    /// What each sample did to exitance, intensity on axis and peak; `None` of a fit that was stored and taken up again.
     pub fn influence(&self) -> Option<&Influence> {
         self.influence.as_ref()
     }

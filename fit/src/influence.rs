@@ -1,18 +1,26 @@
-//! How much each sample weighs in the exitance, so that the independent part of its uncertainty can
-//! be told apart by what each sample's variance consists of. Knows no source of noise by name.
+//! How much each sample weighs in the exitance, in the radiance along the normal and at the peak, so that
+//! the independent part of their uncertainties can be told apart by what each sample's variance consists of. Knows no source of noise by name.
 
 use crate::basis::dot;
 use crate::beam::design::Design;
 use crate::nuisance::Solved;
 use crate::weights::Settled;
+use crate::{Chart, Fit, Ray};
 
-/// What each sample did to the exitance. Lives as long as the fit that made it; it is not stored.
+/// What each sample did to some quantities. Lives as long as the fit that made it; it is not stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Influence {
     /// One a sample, in the order handed in: by how much the exitance grows with its value, sr. The
     /// squares times the samples' variances add to the independent variance, less what a penalty
     /// holds of it.
     pub exitance: Vec<f64>,
+    /// The same of the mean over the region along its normal: of the intensity on axis, over the
+    /// region's area. Empty in charts other than the surface one.
+    pub normal: Vec<f64>,
+    /// The same of the radiance at the peak.
+    pub peak: Vec<f64>,
+    /// Where the peak was then.
+    pub peak_ray: Ray,
     /// One a sample: the part of its variance that comes from rays off the one that was meant
     /// ([`crate::Shift::Jitter`]), in the values' unit squared.
     pub moved: Vec<f64>,
@@ -27,6 +35,7 @@ pub struct Influence {
     pub(crate) values: Vec<f64>,
     /// What one u of each nuisance does to them.
     pub(crate) columns: Vec<Vec<f64>>,
+    watched: Watched,
 }
 
 impl Influence {
@@ -37,55 +46,89 @@ impl Influence {
         settled: &Settled,
         solved: &Solved,
         factor: &[f64],
+        watched: Watched,
     ) -> Self {
-        let carried = carried(design, factor);
-        let nuisances = solved.carried(&carried);
-        let mut room = design.room();
-        let along = |i: usize| {
-            let columns = settled.columns.iter().zip(&nuisances);
+        let carried = watched.carried(factor);
+        let nuisances = carried.each_ref().map(|carried| solved.carried(carried));
+        let along = |k: usize, i: usize| {
+            let columns = settled.columns.iter().zip(&nuisances[k]);
             columns.map(|(column, carried)| column[i] * carried).sum::<f64>()
         };
-        let exitance = settled
-            .variances
-            .iter()
-            .enumerate()
-            .map(|(i, variance)| (design.level(i, &carried, &mut room) + along(i)) / variance)
-            .collect();
+        let [exitance, normal, peak] = grown(design, &settled.variances, &carried, along);
         let excess = settled.excess;
         let stated = settled.variances.iter().zip(&settled.weights);
         Self {
             exitance,
+            normal,
+            peak,
+            peak_ray: watched.peak_ray,
             moved: settled.moved.clone(),
             excess,
             variances: settled.variances.clone(),
             stated: stated.map(|(variance, weight)| variance - excess / weight).collect(),
             values: settled.values.clone(),
             columns: settled.columns.clone(),
+            watched,
         }
     }
 
     /// Of the same samples under other variances.
     pub(crate) fn under(&self, variances: Vec<f64>, design: &Design<'_>, factor: &[f64]) -> Self {
-        let carried = carried(design, factor);
-        let mut room = design.room();
-        let along = variances.iter().enumerate();
-        let exitance =
-            along.map(|(i, variance)| design.level(i, &carried, &mut room) / variance).collect();
-        Self { exitance, variances, ..self.clone() }
+        let carried = self.watched.carried(factor);
+        let [exitance, normal, peak] = grown(design, &variances, &carried, |_, _| 0.0);
+        Self { exitance, normal, peak, variances, ..self.clone() }
     }
 }
 
-/// S Sᵀ f of the exitance.
-fn carried(design: &Design<'_>, factor: &[f64]) -> Vec<f64> {
-    let functional = design.basis().exitance();
-    let p = functional.len();
-    let column = |j: usize| &factor[j * (j + 1) / 2..][..=j];
-    let mut carried = vec![0.0; p];
-    for j in 0..p {
-        let product = dot(column(j), &functional[..=j]);
-        for (out, s) in carried.iter_mut().zip(column(j)) {
-            *out += product * s;
+/// The functionals that are told apart: exitance, mean along the normal, radiance at the peak.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Watched {
+    rows: [Vec<f64>; 3],
+    peak_ray: Ray,
+}
+
+impl Watched {
+    pub(crate) fn of(fit: &Fit) -> Self {
+        let (basis, peak_ray) = (fit.functions(), fit.peak().ray);
+        let is_surface = fit.region().chart == Chart::Surface;
+        let normal = if is_surface { basis.mean_over_region(0.0, 0.0) } else { Vec::new() };
+        let mut peak = vec![0.0; basis.len()];
+        basis.row(&peak_ray, &mut basis.scratch(), &mut peak);
+        Self { rows: [basis.exitance().to_vec(), normal, peak], peak_ray }
+    }
+
+    /// S Sᵀ f of each; nothing of one that there is not.
+    fn carried(&self, factor: &[f64]) -> [Vec<f64>; 3] {
+        self.rows.each_ref().map(|row| {
+            let mut carried = vec![0.0; row.len()];
+            for j in 0..row.len() {
+                let column = &factor[j * (j + 1) / 2..][..=j];
+                let product = dot(column, &row[..=j]);
+                for (out, s) in carried.iter_mut().zip(column) {
+                    *out += product * s;
+                }
+            }
+            carried
+        })
+    }
+}
+
+/// By how much each grows with each sample's value; every row is made once.
+fn grown(
+    design: &Design<'_>,
+    variances: &[f64],
+    carried: &[Vec<f64>; 3],
+    along: impl Fn(usize, usize) -> f64,
+) -> [Vec<f64>; 3] {
+    let mut grown = [const { Vec::new() }; 3];
+    let (mut room, mut row) = (design.room(), vec![0.0; design.basis().len()]);
+    for (i, variance) in variances.iter().enumerate() {
+        design.row(i, &mut room, &mut row);
+        for (k, (out, carried)) in grown.iter_mut().zip(carried).enumerate() {
+            if !carried.is_empty() {
+                out.push((dot(&row, carried) + along(k, i)) / variance);
+            }
         }
     }
-    carried
+    grown
 }

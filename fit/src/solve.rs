@@ -10,6 +10,7 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check;
 use crate::fitted::Fit;
+use crate::influence::Watched;
 use crate::measured::Measured;
 use crate::nuisance::{Solved, packed, without};
 use crate::parts::{CommonShift, Parts, Quality};
@@ -127,16 +128,17 @@ pub fn fit_readings(
     if prior.is_none() && settled.weights.contains(&0.0) {
         all_determined(&design, solution, &settled)?;
     }
-    let influence = Influence::of(&design, &settled, &solved, &packed(&inverse, 1.0));
     let weighed = weighed(readings, &settled, fitted);
     let own = nuisances.iter().zip(own);
     shifts.extend(own.map(|(c, shift)| CommonShift { name: c.name.clone(), shift }));
     let region = *region;
     let truncation = None;
-    Fit::from_parts(Parts { region, model, coefficients, factor, shifts, quality, truncation })
-        .map(|fit| fit.with_influence(influence).with_weighed(weighed))
-        .map(|fit| fit.with_measured(Some(Measured::of(samples))))
-        .map_err(|_| FitError::OutOfRange)
+    let parts = Parts { region, model, coefficients, factor, shifts, quality, truncation };
+    let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
+    let (watched, whole) = (Watched::of(&fit), packed(&inverse, 1.0));
+    let influence = Influence::of(&design, &settled, &solved, &whole, watched);
+    let measured = Some(Measured::of(samples));
+    Ok(fit.with_influence(influence).with_weighed(weighed).with_measured(measured))
 }
 
 /// What readings came with that makes no sense.

@@ -27,7 +27,7 @@ use crate::export::{
 };
 use crate::plan::Wanted;
 use crate::rig::Reading;
-use crate::rig::calibration::{Fitted, calibrate};
+use crate::rig::calibration::{Fitted, IndependentParts, calibrate};
 
 pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
@@ -292,7 +292,7 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         n_excluded: input.samples.len() - samples.len(),
         notes: &notes,
         truth: None,
-        independent: &[],
+        independent: &IndependentParts::NONE,
         derived: &derived,
         rounds: &[],
         monte_carlo: monte_carlo.as_ref(),
@@ -343,7 +343,7 @@ fn fit_stream(
         n_excluded: scan.samples - scan.used,
         notes: &notes,
         truth: None,
-        independent: &[],
+        independent: &IndependentParts::NONE,
         derived: &derived,
         rounds: &[],
         monte_carlo: None,

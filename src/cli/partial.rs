@@ -23,7 +23,7 @@ use crate::export::{
 };
 use crate::plan::Wanted;
 use crate::rig::Quantity;
-use crate::rig::calibration::{FittedDrift, calibrate};
+use crate::rig::calibration::{FittedDrift, IndependentParts, calibrate};
 
 /// A partial fit of 4,096 coefficients and dozens of common components is far below.
 const PARTIAL_BYTES_MAX: u64 = 1 << 30;
@@ -246,7 +246,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
         n_excluded: usize::try_from(n_excluded).unwrap_or(usize::MAX),
         notes: &notes,
         truth: None,
-        independent: &[],
+        independent: &IndependentParts::NONE,
         derived: &derived,
         rounds: &[],
         monte_carlo: None,

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use fit::{Contribution, Fit, FitError, Optics, Region, Rules, Wish};
+use fit::{Fit, FitError, Optics, Region, Rules, Wish};
 
 use super::adapting;
 use super::derive::{derive, write_tables};
@@ -19,7 +19,7 @@ use crate::export::{
 };
 use crate::journal::{Header, InputRole, Order, Reader};
 use crate::rig::Reading;
-use crate::rig::calibration::{Calibrated, Fitted, Part, Sample, calibrate};
+use crate::rig::calibration::{Calibrated, Fitted, IndependentParts, Part, Sample, calibrate};
 use crate::study::Score;
 
 /// Points of the accuracy curve at most: each is a fit of its own.
@@ -40,8 +40,8 @@ pub(crate) struct Results {
     pub(crate) accuracy: Vec<AccuracyPoint>,
     /// What the fit gives each sample's reading, in the samples' order; empty without a fit.
     pub(crate) levels: Vec<f64>,
-    /// The independent part of the exitance's u by source.
-    pub(crate) independent: Vec<Contribution>,
+    /// The independent parts of u by source.
+    pub(crate) independent: IndependentParts,
     /// What the plan asks to be derived from the fit.
     pub(crate) derived: Vec<DerivedQuantity>,
 }
@@ -72,7 +72,7 @@ impl Results {
         );
         let independent = fitted
             .as_ref()
-            .map_or_else(|_| Vec::new(), |fitted| calibrated.independent_budget(fitted));
+            .map_or(IndependentParts::NONE, |fitted| calibrated.independent_parts(fitted));
         let score = score.flatten();
         Ok(Self { calibrated, fitted, truth, score, accuracy, levels, independent, derived })
     }

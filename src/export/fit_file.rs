@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::charted::{put_charted, ray_json, region_json};
 use super::{DerivedQuantity, MonteCarlo, Treatment};
 use crate::rig::Quantity;
+use crate::rig::calibration::IndependentParts;
 use crate::study::adaptive::Account;
 
 /// What fit.json says. Numbers that do not exist are `null`.
@@ -36,8 +37,8 @@ pub struct FitFile<'a> {
     pub notes: &'a [String],
     /// What is true, on a simulated rig.
     pub truth: Option<Truth>,
-    /// The independent part of the exitance's u by source; empty where that is not known.
-    pub independent: &'a [Contribution],
+    /// The independent parts of u by source.
+    pub independent: &'a IndependentParts,
     /// What was derived from the fit beyond what is always there.
     pub derived: &'a [DerivedQuantity],
     /// What was found after each round of a run that decided on the way; empty for others.
@@ -130,8 +131,6 @@ impl FitFile<'_> {
         put("notes", self.notes.iter().cloned().chain(aliased).map(Value::from).collect());
         put("monte_carlo", self.monte_carlo.map_or(Value::Null, MonteCarlo::json));
         if fit.region().chart == Chart::Surface {
-            put("uncertainty_budget_exitance", budget(&self.fit.contributions()));
-            put("uncertainty_budget_exitance_independent", budget(self.independent));
             self.put_derived(&mut object);
         } else {
             put_charted(fit, *quantity, &mut object);
@@ -153,11 +152,20 @@ impl FitFile<'_> {
         let Self { fit, quantity, .. } = self;
         let mut exitance = estimate(fit.exitance());
         exitance["measured_fraction"] = json!(fit.measured_fraction());
+        put_budget(&mut exitance, &fit.contributions(), &self.independent.exitance, 1.0);
         object.insert(quantity.exitance_key().to_owned(), exitance);
         // The region's cone lies within the hemisphere, so that it has an exitance.
         let within = fit.exitance_within(fit.region().theta_max_rad).map_or(Value::Null, estimate);
         object.insert(quantity.exitance_within_region_key().to_owned(), within);
-        object.insert(quantity.flux_key().to_owned(), estimate(fit.flux()));
+        let area_m2 = fit.region().area_m2();
+        let mut flux = estimate(fit.flux());
+        put_budget(&mut flux, &fit.contributions(), &self.independent.exitance, area_m2);
+        object.insert(quantity.flux_key().to_owned(), flux);
+        let normal = fit.mean_towards(0.0, 0.0).times(area_m2);
+        let mut intensity = estimate(fit.of(&normal));
+        let parts = fit.contributions_of(&normal);
+        put_budget(&mut intensity, &parts, &self.independent.intensity, 1.0);
+        object.insert(quantity.intensity_on_axis_key().to_owned(), intensity);
     }
 
     fn put_peak(&self, object: &mut Map<String, Value>) {
@@ -167,6 +175,8 @@ impl FitFile<'_> {
         at["value"] = json!(peak.radiance.value);
         at["u"] = json!(peak.radiance.u);
         at["u_independent"] = json!(peak.radiance.u_independent);
+        let parts = fit.radiance_contributions(&peak.ray);
+        put_budget(&mut at, &parts, &self.independent.peak, 1.0);
         object.insert(quantity.peak_key().to_owned(), at);
     }
 
@@ -189,8 +199,19 @@ impl FitFile<'_> {
     }
 }
 
-fn budget(rows: &[Contribution]) -> Value {
-    rows.iter().map(|row| json!({"name": row.name, "u": row.u})).collect()
+/// Puts the uncertainty by source, times a factor: the first row is the independent part as a whole,
+/// the others are what readings share; and that part by its own sources.
+fn put_budget(
+    object: &mut Value,
+    rows: &[Contribution],
+    independent: &[Contribution],
+    factor: f64,
+) {
+    let budget = |rows: &[Contribution]| -> Value {
+        rows.iter().map(|row| json!({"name": row.name, "u": factor * row.u})).collect()
+    };
+    object["budget"] = budget(rows);
+    object["budget_independent"] = budget(independent);
 }
 
 /// Which functions. What a kind does not have is null.
@@ -349,7 +370,7 @@ mod tests {
             n_excluded: 1,
             notes: &notes,
             truth: Some(truth),
-            independent: &[],
+            independent: &IndependentParts::NONE,
             derived: &[],
             rounds: &[],
             monte_carlo: None,
@@ -399,7 +420,7 @@ mod tests {
                 n_excluded: 0,
                 notes: &[],
                 truth: None,
-                independent: &[],
+                independent: &IndependentParts::NONE,
                 derived: &[],
                 rounds: &[],
                 monte_carlo: None,

@@ -3,7 +3,6 @@
 use super::svg::{Anchor, Picture, Svg, px};
 use super::ticks::{round_up, significant};
 
-const NAME: &str = "budget";
 const LEFT: f64 = 190.0;
 const LENGTH: f64 = 430.0;
 const ROW: f64 = 24.0;
@@ -14,6 +13,8 @@ const SEEN: f64 = 0.002;
 
 /// What is drawn.
 pub struct Budget<'a> {
+    /// The picture's name: `budget`.
+    pub name: &'static str,
     /// What is uncertain: `exitance`.
     pub quantity: &'a str,
     /// Its value; the parts are shown relative to it.
@@ -69,7 +70,7 @@ impl Budget<'_> {
              square of the whole; “independent” is what falls as more is measured.",
             self.quantity
         );
-        Some(Picture { name: NAME, title, caption, svg: svg.finish() })
+        Some(Picture { name: self.name, title, caption, svg: svg.finish() })
     }
 }
 
@@ -90,7 +91,7 @@ mod tests {
     fn the_largest_part_is_on_top_and_small_ones_share_a_bar() {
         let part = |i: u32| (format!("part {i}"), f64::from(i));
         let parts: Vec<(String, f64)> = (0..20).map(part).collect();
-        let budget = Budget { quantity: "exitance", value: 100.0, parts: &parts };
+        let budget = Budget { name: "budget", quantity: "exitance", value: 100.0, parts: &parts };
         let svg = budget.picture().unwrap().svg;
         assert_eq!(svg.matches("class=\"bar\"").count(), BARS_MAX + 2);
         // √(1² + … + 19²), and √(1² + … + 5²).
@@ -101,7 +102,13 @@ mod tests {
     #[test]
     fn nothing_to_relate_to_is_no_picture() {
         let parts = [("independent".to_owned(), 1.0)];
-        assert_eq!(Budget { quantity: "exitance", value: 0.0, parts: &parts }.picture(), None);
-        assert_eq!(Budget { quantity: "exitance", value: 1.0, parts: &[] }.picture(), None);
+        assert_eq!(
+            Budget { name: "budget", quantity: "exitance", value: 0.0, parts: &parts }.picture(),
+            None
+        );
+        assert_eq!(
+            Budget { name: "budget", quantity: "exitance", value: 1.0, parts: &[] }.picture(),
+            None
+        );
     }
 }

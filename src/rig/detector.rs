@@ -134,6 +134,15 @@ impl Quantity {
         }
     }
 
+    /// The key of the intensity along the normal in fit.json.
+    pub const fn intensity_on_axis_key(self) -> &'static str {
+        match self {
+            Self::Luminance => "luminous_intensity_on_axis_cd",
+            Self::Radiance => "intensity_on_axis_w_per_sr",
+            Self::Relative => "intensity_on_axis_relative",
+        }
+    }
+
     /// The key of the highest radiance in fit.json.
     pub const fn peak_key(self) -> &'static str {
         match self {

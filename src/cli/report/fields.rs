@@ -7,7 +7,7 @@ use super::words::Words;
 use crate::cli::results::Results;
 use crate::cli::setup::Setup;
 use crate::report::{Budget, Hemisphere, Picture, Plane, Polar, Section};
-use crate::rig::calibration::{Fitted, Sample};
+use crate::rig::calibration::{Fitted, IndependentParts, Sample};
 
 /// Multiplications that the map of u may cost: each place takes the square of the coefficients.
 const WORK_MAX: f64 = 4e7;
@@ -108,21 +108,42 @@ fn plane(fit: &Fit, words: &Words, used: &[&Sample]) -> Option<Picture> {
     })
 }
 
-/// The uncertainty's sources, the independent part by its own.
+/// The uncertainties' sources, the independent parts by their own.
 pub(super) fn budget(
     setup: &Setup,
     fitted: &Fitted,
-    independent: &[Contribution],
+    independent: &IndependentParts,
 ) -> Option<Section> {
     let words = Words::of(setup.rig.detector.quantity);
-    let mut rows = fitted.fit.contributions();
-    if !independent.is_empty() {
-        // The first row is the independent part as a whole.
-        rows.splice(..1, independent.iter().cloned());
-    }
-    let parts: Vec<(String, f64)> = rows.into_iter().map(|part| (part.name, part.u)).collect();
-    let value = fitted.fit.exitance().value;
-    let picture = Budget { quantity: words.exitance, value, parts: &parts }.picture()?;
+    let fit = &fitted.fit;
+    let bars = |name: &'static str, quantity: &str, value: f64, rows: Vec<Contribution>, own| {
+        let own: &[Contribution] = own;
+        let mut rows = rows;
+        if !own.is_empty() {
+            // The first row is the independent part as a whole.
+            rows.splice(..1, own.iter().cloned());
+        }
+        let parts: Vec<(String, f64)> = rows.into_iter().map(|part| (part.name, part.u)).collect();
+        Budget { name, quantity, value, parts: &parts }.picture()
+    };
+    let exitance = fit.exitance().value;
+    let normal = fit.mean_towards(0.0, 0.0).times(fit.region().area_m2());
+    let on_axis = format!("{} on axis", words.intensity);
+    let peak = fit.peak();
+    let at_peak = format!("{} at the peak", words.radiance);
+    let rows = fit.radiance_contributions(&peak.ray);
+    let all = [
+        bars("budget", words.exitance, exitance, fit.contributions(), &independent.exitance),
+        bars(
+            "budget-intensity",
+            &on_axis,
+            fit.of(&normal).value,
+            fit.contributions_of(&normal),
+            &independent.intensity,
+        ),
+        bars("budget-peak", &at_peak, peak.radiance.value, rows, &independent.peak),
+    ];
+    let pictures: Vec<Picture> = all.into_iter().flatten().collect();
     let title = "Where the uncertainty comes from".to_owned();
-    Some(Section { title, pictures: vec![picture], ..Section::default() })
+    (!pictures.is_empty()).then(|| Section { title, pictures, ..Section::default() })
 }

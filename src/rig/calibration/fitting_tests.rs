@@ -230,6 +230,34 @@ fn a_step_between_ranges_is_found_where_both_saw_the_same_field() {
     assert!((0.75..1.3).contains(&rms), "{rms}");
 }
 
+#[test]
+fn independent_parts_by_source_add_to_the_independent_part() {
+    let rig = rig();
+    let all = readings(&rig, 4, |radiance, _| radiance, |index| u8::from(index % 3 == 0));
+    let mut calibrated = calibrate(&rig, &all).unwrap();
+    let (rays, _) = region(&calibrated);
+    let at = (rays[0].x_m - 0.001, rays[0].x_m + 0.001);
+    let region = fit::Region::surface(at, (rays[0].y_m - 0.001, rays[0].y_m + 0.001), 1.25);
+    let fitted = calibrated.fit(&region, &WISH, None).unwrap();
+    calibrated.restate_from(&fitted.fit, None);
+    let parts = calibrated.independent_parts(&fitted);
+    let fit = &fitted.fit;
+    let normal = fit.mean_towards(0.0, 0.0).times(region.area_m2());
+    for (rows, whole) in [
+        (&parts.exitance, fit.contributions()),
+        (&parts.intensity, fit.contributions_of(&normal)),
+        (&parts.peak, fit.radiance_contributions(&fit.peak().ray)),
+    ] {
+        let sum: f64 = rows.iter().map(|row| row.u * row.u).sum();
+        assert!((sum / whole[0].u.powi(2) - 1.0).abs() < 0.02, "{rows:?} {whole:?}");
+        assert_eq!(rows[0].name, "shot noise");
+    }
+    // A fit that was stored no longer knows its samples.
+    let stored = fit::Fit::from_parts(fit.parts().clone()).unwrap();
+    let stored = Fitted { fit: stored, ..fitted.clone() };
+    assert_eq!(calibrated.independent_parts(&stored), IndependentParts::NONE);
+}
+
 /// Where a rig that stands askew looks, every rotation exact.
 fn askew(positions: AxisPositions, [x, y, z, arm_axis, beam, tilt, towards]: [f64; 7]) -> Ray {
     use glam::{DMat3, DVec3};

@@ -27,6 +27,7 @@ mod sample;
 #[cfg(test)]
 mod tests;
 
+pub use budget::IndependentParts;
 pub use component::{Component, Effect};
 pub use dark::Dark;
 pub use drift::FittedDrift;
