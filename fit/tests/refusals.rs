@@ -224,3 +224,42 @@ fn one_pose_tells_no_field_unless_it_is_said_to_be_constant() {
     let fit = chosen(constant).unwrap().fit;
     assert!((fit.value(&ray) - 5.0).abs() < 0.1);
 }
+
+#[test]
+fn splines_that_only_a_file_asks_for_are_counted_before_they_are_made() {
+    let of = |theta_spans, phi_spans, fine| fit::BasisSpec {
+        angular: fit::Angular::Splines { theta_spans, phi_spans, fine },
+        position: fit::Position::Legendre { degree: 0 },
+    };
+    let begun = std::time::Instant::now();
+    for halvings in [0, 8, 40] {
+        let fine = fit::Fine { from: 0, to: usize::MAX, halvings };
+        let text = refusal(&good(), &REGION, of(32_768, 32_768, fine));
+        says(&text, "coefficients");
+    }
+    assert!(begun.elapsed().as_secs() < 5);
+    // Nor are few ones miscounted.
+    let fine = fit::Fine { from: 2, to: 4, halvings: 3 };
+    assert_eq!(of(8, 16, fine).len(), 342);
+}
+
+#[test]
+fn a_cone_beyond_the_horizon_is_refused_by_every_basis() {
+    let splines = fit::Angular::Splines { theta_spans: 2, phi_spans: 6, fine: fit::Fine::NONE };
+    let all = [
+        fit::Angular::Zernike { degree: 2, cosine_columns: 0 },
+        fit::Angular::Zernike { degree: 2, cosine_columns: 1 },
+        fit::Angular::Hemispherical { degree: 2 },
+        fit::Angular::EvenHarmonics { degree: 2 },
+        splines,
+    ];
+    let samples = scenes::exact(&scenes::raster_rays(&REGION, 8, 12, 1), |_| 1.0);
+    for angular in all {
+        let basis = fit::BasisSpec { angular, position: fit::Position::Legendre { degree: 0 } };
+        let fit = fit::fit(&samples, &REGION, basis, &[]).unwrap();
+        for wrong in [f64::NAN, -0.1, 1.6, f64::INFINITY] {
+            assert!(fit.exitance_within(wrong).is_err(), "{angular:?} {wrong}");
+        }
+        assert!(fit.exitance_within(0.0).unwrap().value.abs() < 1e-12, "{angular:?}");
+    }
+}

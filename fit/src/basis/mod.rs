@@ -204,10 +204,16 @@ impl Basis {
 
     /// The exitance within a cone about the normal, mean over the region, as a linear functional:
     /// the sum of its elements times the coefficients. Over the whole sphere without the cosine;
-    /// between two planes all of it, whatever the angle.
+    /// between two planes all of it, whatever the angle. Elsewhere an angle below 0, beyond the
+    /// chart's own end or NaN is refused.
     pub(crate) fn exitance_within(&self, theta_max_rad: f64) -> Result<Vec<f64>, DomainError> {
         if self.is_joint() {
             return Ok(self.exitance.clone());
+        }
+        let end_rad = if self.region.chart.is_whole_sphere() { PI } else { FRAC_PI_2 };
+        if !(0.0..=end_rad).contains(&theta_max_rad) {
+            let (argument, value) = ("theta_max_rad", theta_max_rad);
+            return Err(DomainError::Outside { argument, value, low: 0.0, high: end_rad });
         }
         let mut over_cone = vec![0.0; self.angular_len()];
         self.directions.integrals_within(theta_max_rad, &mut over_cone)?;

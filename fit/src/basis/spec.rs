@@ -1,6 +1,6 @@
 //! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
 
-use super::splines::{Band, bands, breaks};
+use super::splines::{Band, PHI_SPANS_MIN, bands, breaks};
 use crate::{Chart, FitError};
 
 /// Which functions a field is a sum of: every function of direction times every one of position.
@@ -161,10 +161,10 @@ impl Angular {
                 degree.saturating_add(1).saturating_pow(2)
             }
             Self::EvenHarmonics { degree } | Self::SecondPlane { degree } => triangular(degree),
-            // More spans than this have too many functions whatever they are.
+            // Counting the functions of so many spans takes long, and they are too many anyway.
             Self::Splines { theta_spans, phi_spans, fine }
-                if theta_spans.max(phi_spans) > LOCAL_COEFFICIENTS_MAX
-                    || fine.halvings > HALVINGS_MAX =>
+                if spans(theta_spans, fine) > THETA_SPANS_MAX
+                    || phi_spans > LOCAL_COEFFICIENTS_MAX =>
             {
                 usize::MAX
             }
@@ -227,6 +227,15 @@ impl Position {
     }
 }
 
+/// Spans of θ, the halved ones counted as they are.
+fn spans(theta_spans: usize, fine: Fine) -> usize {
+    let halved = fine.to.min(theta_spans).saturating_sub(fine.from);
+    if fine.halvings > HALVINGS_MAX {
+        return usize::MAX;
+    }
+    theta_spans.saturating_add(halved.saturating_mul((1 << fine.halvings) - 1))
+}
+
 /// 1 + 2 + .. + (degree + 1).
 fn triangular(degree: usize) -> usize {
     degree.saturating_add(1).saturating_mul(degree.saturating_add(2)) / 2
@@ -236,5 +245,7 @@ fn triangular(degree: usize) -> usize {
 const COEFFICIENTS_MAX: usize = 4096;
 /// Of local functions: their factor takes about a gigabyte.
 const LOCAL_COEFFICIENTS_MAX: usize = 32_768;
+/// Of θ: nearly every band holds [`PHI_SPANS_MIN`] functions or more.
+const THETA_SPANS_MAX: usize = LOCAL_COEFFICIENTS_MAX / PHI_SPANS_MIN;
 /// Spans beyond it are narrower than any encoder tells.
 const HALVINGS_MAX: usize = 8;

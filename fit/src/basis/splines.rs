@@ -48,13 +48,15 @@ pub(crate) fn breaks(theta_spans: usize, fine: Fine) -> Vec<f64> {
 /// The bands of θ, from the pole; the first one's function of θ is the sum of the first two splines,
 /// the second's the second.
 pub(crate) fn bands(breaks: &[f64], phi_spans: usize) -> impl Iterator<Item = Band> {
+    let width = |span: &[f64]| span[1] - span[0];
+    let widest = breaks.windows(2).map(width).fold(0.0, f64::max);
     (0..breaks.len() - 1 + DEGREE).map(move |i| match i {
         0 => Band::Orders { first: 0, last: 0 },
         1 => Band::Orders { first: 1, last: 1 },
         2 => Band::Orders { first: 0, last: 2 },
         _ => {
             let theta_rad = greville(i, breaks);
-            let round = (libm::sin(theta_rad) * finer(theta_rad, breaks)).min(1.0);
+            let round = (libm::sin(theta_rad) * finer(theta_rad, breaks, widest)).min(1.0);
             let round = libm::round(phi_spans as f64 * round);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small, positive
             Band::Local { count: (round as usize).max(PHI_SPANS_MIN) }
@@ -64,10 +66,9 @@ pub(crate) fn bands(breaks: &[f64], phi_spans: usize) -> impl Iterator<Item = Ba
 
 /// How many times narrower the span at θ is than the widest. A lobe that is narrow in θ near the pole
 /// bends in φ as much as one at the horizon.
-fn finer(theta_rad: f64, breaks: &[f64]) -> f64 {
-    let width = |span: &[f64]| span[1] - span[0];
-    let widest = breaks.windows(2).map(width).fold(0.0, f64::max);
-    let own = breaks.windows(2).find(|span| theta_rad < span[1]).map_or(widest, width);
+fn finer(theta_rad: f64, breaks: &[f64], widest: f64) -> f64 {
+    let end = breaks.partition_point(|at| *at <= theta_rad).max(1);
+    let own = breaks.get(end).map_or(widest, |at| at - breaks[end - 1]);
     // Halved spans are narrower by whole powers of 2.
     libm::round(widest / own)
 }
@@ -300,6 +301,6 @@ fn round(count: usize) -> Result<BSpline, DomainError> {
 /// Cubic: the field and its first two derivatives are continuous.
 const DEGREE: usize = 3;
 /// Fewer splines round a circle than these tell no lobe's direction; those next to the pole.
-const PHI_SPANS_MIN: usize = 6;
+pub(super) const PHI_SPANS_MIN: usize = 6;
 /// Nodes of a span's integral: a cubic times sin θ cos θ is exact to rounding.
 const GAUSS: usize = 10;
