@@ -21,17 +21,26 @@ pub(crate) fn working(limit: f64, level: f64, variance: f64) -> Working {
     let sigma = variance.sqrt();
     let alpha = (limit - level) / sigma;
     let slope = hazard(alpha);
-    let curvature = (slope * (slope - alpha)).clamp(0.0, 1.0);
+    let curvature = curvature(alpha, slope);
     if curvature < CURVATURE_MIN {
         return Working { value: level, variance: f64::INFINITY };
     }
     Working { value: level + sigma * slope / curvature, variance: variance / curvature }
 }
 
+/// λ (λ - α). Far out λ and α differ in their last digits alone: by the series of both there, to 1e-6.
+fn curvature(alpha: f64, slope: f64) -> f64 {
+    if alpha > FAR {
+        let over = 1.0 / (alpha * alpha);
+        return 1.0 - over * (1.0 - 6.0 * over * (1.0 - 50.0 / 6.0 * over));
+    }
+    (slope * (slope - alpha)).clamp(0.0, 1.0)
+}
+
 /// φ(α)/Φ(-α), to 1e-14 relative up to 25, beyond by its asymptotic series (Abramowitz and Stegun
 /// 26.2.12) to 1e-9.
 fn hazard(alpha: f64) -> f64 {
-    if alpha > 25.0 {
+    if alpha > FAR {
         let over = 1.0 / (alpha * alpha);
         return alpha / (1.0 - over * (1.0 - 3.0 * over * (1.0 - 5.0 * over)));
     }
@@ -40,6 +49,8 @@ fn hazard(alpha: f64) -> f64 {
     density / tail
 }
 
+/// From here on series stand for the tails of the normal distribution.
+const FAR: f64 = 25.0;
 /// Less information than this, as a part of that of a reading, is none: limits eight standard
 /// deviations below the level.
 const CURVATURE_MIN: f64 = 1e-12;
@@ -58,6 +69,17 @@ mod tests {
         let slope = (2.0 / core::f64::consts::PI).sqrt();
         assert!((at.value - (10.0 + 2.0 / slope)).abs() < 1e-12);
         assert!((at.variance - 4.0 / (slope * slope)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_limit_however_far_above_is_a_reading() {
+        for alpha in [25.0 - 1e-9, 25.0 + 1e-9, 1e3, 1e7, 1e9, 1e12, 1e150] {
+            let far = working(alpha, 0.0, 1.0);
+            // λ/d is α + 2/α, and the variance 1 + 1/α², both to 1/α⁴.
+            let over = 1.0 / (alpha * alpha);
+            assert!((far.value / alpha - 1.0 - 2.0 * over).abs() < 30.0 * over * over + 1e-15);
+            assert!((far.variance - 1.0 - over).abs() < 10.0 * over * over + 1e-15, "{far:?}");
+        }
     }
 
     #[test]
