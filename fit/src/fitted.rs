@@ -151,9 +151,10 @@ impl Fit {
         }
     }
 
-    /// The same fit with other coefficients in the same basis.
+    /// The same fit with other coefficients in the same basis: what each sample did to the former ones
+    /// is no longer known.
     pub(crate) fn with_parts(&self, parts: Parts) -> Self {
-        Self { parts, ..self.clone() }
+        Self { parts, influence: None, ..self.clone() }
     }
 
     /// What the fit made of each sample; `None` of a fit that was stored and taken up again, or merged
@@ -162,7 +163,8 @@ impl Fit {
         self.weighed.as_ref()
     }
 
-    /// What each sample did to exitance, intensity on axis and peak; `None` of a fit that was stored and taken up again.
+    /// What each sample did to exitance, intensity on axis and peak; `None` of a fit that was stored and
+    /// taken up again, and of one that a symmetry or a bound changed since.
     pub fn influence(&self) -> Option<&Influence> {
         self.influence.as_ref()
     }
@@ -205,7 +207,7 @@ impl Fit {
     }
 
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
-    /// An angle outside [0, π/2] is refused.
+    /// An angle outside [0, π/2] is refused, in charts of the whole sphere one outside [0, π].
     pub fn exitance_within(&self, theta_max_rad: f64) -> Result<Estimate, DomainError> {
         let own = self.basis.exitance_within(theta_max_rad)?;
         let within = |basis: &Basis| basis.exitance_within(theta_max_rad);

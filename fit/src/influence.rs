@@ -29,7 +29,7 @@ pub struct Influence {
     pub excess: f64,
     /// One a sample: its variance as the covariance takes it, in the values' unit squared.
     pub variances: Vec<f64>,
-    /// The part of it that is stated.
+    /// The part of it that is stated; infinite of samples that count for nothing.
     pub(crate) stated: Vec<f64>,
     /// What the samples count as having read.
     pub(crate) values: Vec<f64>,
@@ -55,17 +55,15 @@ impl Influence {
             columns.map(|(column, carried)| column[i] * carried).sum::<f64>()
         };
         let [exitance, normal, peak] = grown(design, &settled.variances, &carried, along);
-        let excess = settled.excess;
-        let stated = settled.variances.iter().zip(&settled.weights);
         Self {
             exitance,
             normal,
             peak,
             peak_ray: watched.peak_ray,
             moved: settled.moved.clone(),
-            excess,
+            excess: settled.excess,
             variances: settled.variances.clone(),
-            stated: stated.map(|(variance, weight)| variance - excess / weight).collect(),
+            stated: settled.stated.clone(),
             values: settled.values.clone(),
             columns: settled.columns.clone(),
             watched,

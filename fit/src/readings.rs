@@ -50,6 +50,17 @@ pub struct Weighed {
     pub nuisances: Vec<Fitted>,
 }
 
+impl Weighed {
+    /// Whether a sample lost nearly all of its weight for its residual: it has no say in what
+    /// functions the others ask for.
+    pub(crate) fn is_outlier(&self, sample: usize) -> bool {
+        self.weights[sample] < OUTLYING && self.limits.binary_search(&sample).is_err()
+    }
+}
+
+/// A sample with less of its weight left is an outlier.
+const OUTLYING: f64 = 0.1;
+
 /// A nuisance as it came out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {

@@ -38,22 +38,9 @@ pub struct Ruled {
     pub nonnegative: Option<Nonnegative>,
 }
 
-impl Ruled {
-    /// With what the field's functions can't follow in every u: [`Fit::with_truncation`] of the
-    /// readings that the field was fitted to.
-    pub fn with_truncation(
-        self,
-        readings: &Readings<'_>,
-        optics: Option<&Optics>,
-    ) -> Result<Self, FitError> {
-        let Readings { samples, flown, common, .. } = *readings;
-        Ok(Self { fit: self.fit.with_truncation(samples, flown, common, optics)?, ..self })
-    }
-}
-
-/// The fit of readings in the basis that the wish pins or that they ask for, by its rules. Limits
-/// have no part in the choice of the basis; nor have, once they are known, readings that lost nearly
-/// all their weight.
+/// The fit of readings in the basis that the wish pins or that they ask for, by its rules, with what
+/// its functions can't follow in every u ([`Fit::with_truncation`]). Limits have no part in the choice
+/// of the basis; nor have, once they are known, readings that lost nearly all their weight.
 pub fn fit_wished(
     readings: &Readings<'_>,
     region: &Region,
@@ -68,26 +55,31 @@ pub fn fit_wished(
         choose(&said, region, wish, optics)?
     };
     let rules = &wish.rules;
-    let mut ruled = Ruled { choice, ..fit_ruled(readings, region, model, rules, optics)? };
+    let readings = &Readings { robust: rules.robust, ..*readings };
+    let (mut fit, mut choice) = (crate::fit_readings(readings, region, model, optics)?, choice);
     let outlying = |fit: &Fit| {
         let weighed = fit.weighed()?;
-        let is_outlying = |i: usize| weighed.weights[i] < OUTLYING && !weighed.limits.contains(&i);
-        let any = (0..weighed.weights.len()).any(is_outlying);
+        let any = (0..weighed.weights.len()).any(|i| weighed.is_outlier(i));
         any.then(|| {
-            kept(readings, |i| !is_outlying(i) && readings.limits.binary_search(&i).is_err())
+            let is_limit = |i: usize| readings.limits.binary_search(&i).is_ok();
+            kept(readings, |i| !weighed.is_outlier(i) && !is_limit(i))
         })
     };
     if rules.robust != Robust::None
-        && ruled.choice.is_some()
-        && let Some(said) = outlying(&ruled.fit)
+        && choice.is_some()
+        && let Some(said) = outlying(&fit)
     {
-        let (model, choice) = choose(&said, region, wish, optics)?;
-        ruled = Ruled { choice, ..fit_ruled(readings, region, model, rules, optics)? };
+        let model;
+        (model, choice) = choose(&said, region, wish, optics)?;
+        fit = crate::fit_readings(readings, region, model, optics)?;
     }
-    Ok(ruled)
+    let Readings { samples, flown, common, .. } = *readings;
+    // Before what the rules do to the field: only of the fit itself it is known what readings did to it.
+    let fit = fit.with_truncation(samples, flown, common, optics)?;
+    Ok(Ruled { choice, ..fit.ruled(rules)? })
 }
 
-/// The same in a basis that is known.
+/// The same in a basis that is known, without what its functions can't follow.
 pub fn fit_ruled(
     readings: &Readings<'_>,
     region: &Region,
@@ -126,6 +118,3 @@ fn kept(readings: &Readings<'_>, is_kept: impl Fn(usize) -> bool) -> Vec<Sample>
     let samples = readings.samples.iter().enumerate();
     samples.filter(|(i, _)| is_kept(*i)).map(|(_, sample)| *sample).collect()
 }
-
-/// A reading with less of its weight left has no say in the choice of the basis.
-const OUTLYING: f64 = 0.1;

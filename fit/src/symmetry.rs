@@ -4,14 +4,14 @@
 //! what turning or mirroring does to the coefficients, the row space of T - 1. T is found by evaluating the
 //! functions along rays and their images, so that any basis that holds the images of its fields will do;
 //! one that does not is refused. Vᵀc should be zero within its whole covariance K, the common components'
-//! part included (an axis that is off makes a round source look lopsided): its square by K⁻¹ follows χ² of as many
+//! part and that of what the functions can't follow included (an axis that is off makes a round source look lopsided): its square by K⁻¹ follows χ² of as many
 //! degrees of freedom as there are combinations. If that is not too rare, c is moved to the nearest symmetric
 //! field by the independent covariance, `c - C V (VᵀC V)⁻¹ Vᵀc`, and so is the covariance: the fit in the basis of
 //! symmetric fields alone.
 
 use crate::basis::Basis;
 use crate::parts::CommonShift;
-use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region, sparse};
+use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region, Truncation, sparse};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
 
@@ -171,7 +171,11 @@ impl Fit {
         let shifts: &[CommonShift] = &self.parts().shifts;
         let common = Mat::from_fn(p, shifts.len(), |i, k| shifts[k].shift[i]);
         let along = v.transpose() * &common;
-        let whole = &own + &along * along.transpose();
+        let mut whole = &own + &along * along.transpose();
+        if let Some(Truncation { missed, .. }) = &self.parts().truncation {
+            let along = v.transpose() * Mat::from_fn(p, missed.len(), |i, k| missed[k][i]);
+            whole += &along * along.transpose();
+        }
         let c = Mat::from_fn(p, 1, |i, _| self.coefficients()[i]);
         let off = v.transpose() * &c;
         let out_of_range = || SymmetryError::Fit(FitError::OutOfRange);
@@ -205,15 +209,41 @@ impl Fit {
         } else {
             old
         };
+        let truncation = self.parts().truncation.as_ref();
+        let truncation = truncation.map(|missed| self.under(symmetry, missed, &remove));
         let parts = Parts {
             coefficients,
             factor: packed(&remove(&s)),
             shifts,
             quality,
+            truncation: truncation.transpose()?,
             ..self.parts().clone()
         };
         let measured = self.measured().and_then(|all| all.under(symmetry, self.region()));
         Ok((self.with_parts(parts).with_measured(measured), test))
+    }
+
+    /// What the symmetric fit misses of a symmetric source: of every missed field what the fit's own
+    /// functions have of it goes the way of the coefficients, of the finer functions the symmetric
+    /// ones stay. Where they don't hold the images of their fields, over a region that is no
+    /// square, all of them stay: too much rather than too little.
+    fn under(
+        &self,
+        symmetry: Symmetry,
+        truncation: &Truncation,
+        remove: &impl Fn(&Mat<f64>) -> Mat<f64>,
+    ) -> Result<Truncation, SymmetryError> {
+        let Some(beyond) = self.beyond() else { return Ok(truncation.clone()) };
+        let (p, q, missed) = (self.coefficients().len(), beyond.len(), &truncation.missed);
+        let own = remove(&Mat::from_fn(p, missed.len(), |i, k| missed[k][i]));
+        let mut finer = Mat::from_fn(q, missed.len(), |i, k| missed[k][p + i]);
+        match forbidden(beyond, symmetry) {
+            Ok(v) => finer = &finer - &v * (v.transpose() * &finer),
+            Err(SymmetryError::Basis { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        let field = |k: usize| own.col(k).iter().chain(finer.col(k).iter()).copied().collect();
+        Ok(Truncation { missed: (0..missed.len()).map(field).collect(), ..truncation.clone() })
     }
 
     fn factor_matrix(&self) -> Mat<f64> {

@@ -30,6 +30,8 @@ pub(crate) struct Settled {
     pub(crate) values: Vec<f64>,
     /// What the samples are weighted by; infinite of those that count for nothing.
     pub(crate) variances: Vec<f64>,
+    /// The part of them that is stated; of samples that count for less it counts for less as well.
+    pub(crate) stated: Vec<f64>,
     /// What is left of each one's weight: 1 but for outliers and limits.
     pub(crate) weights: Vec<f64>,
     /// The part of each variance that comes from rays off the ones that were meant.
@@ -101,13 +103,14 @@ pub(crate) fn start(readings: &Readings<'_>, model: Model) -> Settled {
         nuisances: vec![0.0; readings.nuisances.len()],
         values: samples.iter().map(|sample| sample.value).collect(),
         variances: Vec::new(),
+        stated: Vec::new(),
         weights: vec![1.0; n],
         moved: vec![0.0; n],
         excess,
         determined: 0.0,
     };
-    let stated = model.variances(samples, &start);
-    start.variances = stated.into_iter().map(|variance| variance + excess).collect();
+    start.stated = model.variances(samples, &start);
+    start.variances = start.stated.iter().map(|variance| variance + excess).collect();
     start
 }
 
@@ -126,6 +129,7 @@ impl Settled {
             values: levels.clone(),
             weights: vec![1.0; levels.len()],
             levels,
+            stated: variances.clone(),
             variances,
             moved,
             excess: 0.0,
@@ -203,6 +207,9 @@ impl Settled {
                     change = change.max((variance / old - 1.0).abs());
                 }
             }
+            // Nothing is left to be divided of a weight of 0.
+            self.stated[i] =
+                if self.weights[i] > 0.0 { stated / self.weights[i] } else { f64::INFINITY };
             change = change.max((self.weights[i] - old_weight).abs());
         }
         change < SETTLED_RELATIVE

@@ -3,7 +3,10 @@
 #[allow(dead_code)]
 mod scenes;
 
-use fit::{BasisSpec, Common, Fit, Noise, Ray, Sample, Shift};
+use fit::{
+    Angular, BasisSpec, Common, Fit, Noise, Position, Ray, Readings, Robust, Rules, Sample, Shift,
+    Symmetry, Wish,
+};
 use scenes::{Die, REGION, raster_rays};
 use std::f64::consts::PI;
 
@@ -146,4 +149,123 @@ fn what_was_missed_is_stored_with_the_fit() {
         truncation.missed[0].pop();
     }
     assert!(matches!(Fit::from_parts(parts), Err(fit::FitError::Parts { .. })));
+}
+
+#[test]
+fn readings_that_count_for_nothing_take_no_truncation_away() {
+    // The basis doesn't follow, so that there is scatter beyond the noise; one reading is a glitch,
+    // and one a limit far below what is there.
+    let mut samples = readings(lobe(0.6), &mut Die::new(2));
+    let tukey = |samples: &[Sample], limits: &[usize]| {
+        let of = Readings { robust: Robust::Tukey, limits, ..Readings::of(samples) };
+        fit::fit_readings(&of, &REGION, BASIS, None).unwrap()
+    };
+    let others = [&samples[..40], &samples[42..]].concat();
+    let without = tukey(&others, &[]).with_truncation(&others, &[], &[], None).unwrap();
+    samples[40].value += 0.5;
+    samples[41].value = 0.01;
+    let fit = tukey(&samples, &[41]);
+    assert!(fit.excess_rms() > 0.0, "nothing beyond the noise to begin with");
+    let weights = &fit.weighed().unwrap().weights;
+    assert!(weights[40] == 0.0 && weights[41] < 1e-6, "{} {}", weights[40], weights[41]);
+    let fit = fit.with_truncation(&samples, &[], &[], None).unwrap();
+    assert!(fit.parts().truncation.is_some());
+    let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.5, phi_rad: 0.3 };
+    for (with, without) in
+        [(fit.exitance(), without.exitance()), (fit.radiance(&ray), without.radiance(&ray))]
+    {
+        assert!((with.value / without.value - 1.0).abs() < 1e-4, "{with:?} {without:?}");
+        assert!((0.95..1.05).contains(&(with.u / without.u)), "{with:?} {without:?}");
+    }
+}
+
+#[test]
+fn a_reading_that_hardly_counts_says_little_of_what_is_finer() {
+    // Weights near zero make variances near infinity of the same excess.
+    let mut samples = readings(lobe(0.6), &mut Die::new(2));
+    let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.5, phi_rad: 0.3 };
+    let u_of = |samples: &[Sample]| {
+        let of = Readings { robust: Robust::Huber, ..Readings::of(samples) };
+        let fit = fit::fit_readings(&of, &REGION, BASIS, None).unwrap();
+        fit.with_truncation(samples, &[], &[], None).unwrap().radiance(&ray).u
+    };
+    let clean = u_of(&samples);
+    samples[40].value += 1e5;
+    let ratio = u_of(&samples) / clean;
+    assert!((0.7..1.4).contains(&ratio), "{ratio}");
+}
+
+/// A wide basis times positions, by so many directions at four places.
+fn wide(angular: Angular, position: Position) -> Fit {
+    let noise = Noise::Fixed { variance: SIGMA * SIGMA };
+    let mut die = Die::new(11);
+    let sample = |ray: &Ray| {
+        // A kink that no degree follows, and a slope with the place.
+        let field = 1.0 + (0.8 - ray.theta_rad).abs() + 4.0 * ray.x_m;
+        Sample { ray: *ray, value: field + SIGMA * die.normal(), noise }
+    };
+    let samples: Vec<Sample> = raster_rays(&REGION, 14, 20, 2).iter().map(sample).collect();
+    let fit = fit::fit(&samples, &REGION, BasisSpec { angular, position }, &[]).unwrap();
+    fit.with_truncation(&samples, &[], &[], None).unwrap()
+}
+
+#[test]
+fn a_wide_basis_has_its_truncation_too() {
+    let position = Position::Legendre { degree: 1 };
+    let splines = Angular::Splines { theta_spans: 4, phi_spans: 8, fine: fit::Fine::NONE };
+    for angular in [Angular::Zernike { degree: 8, cosine_columns: 0 }, splines] {
+        let fit = wide(angular, position);
+        assert!(fit.parts().truncation.is_some(), "{angular:?}");
+        // Off by the kink, and u knows.
+        let ray = Ray { x_m: 0.0, y_m: 0.015, theta_rad: 0.8, phi_rad: 0.3 };
+        let found = fit.radiance(&ray);
+        assert!((found.value - 1.0).abs() < 3.0 * found.u, "{angular:?}: {found:?}");
+    }
+}
+
+#[test]
+fn a_symmetry_stays_in_what_is_missed() {
+    let mut die = Die::new(4);
+    let (mut with, mut without) = (Vec::new(), Vec::new());
+    for run in 0..20 {
+        let exponent = 0.6 + 6.4 * (f64::from(run) * 0.618_034).fract();
+        let samples = readings(lobe(exponent), &mut die);
+        let of = |symmetry| {
+            let wish = Wish {
+                angular_degree: Some(6),
+                position_degree: Some(0),
+                rules: Rules { symmetry, ..Rules::default() },
+                ..Wish::default()
+            };
+            let ruled = fit::fit_wished(&Readings::of(&samples), &REGION, &wish, None).unwrap();
+            assert!(
+                symmetry.is_none() || matches!(ruled.symmetry, Some(Ok(_))),
+                "{:?}",
+                ruled.symmetry
+            );
+            ruled.fit
+        };
+        let symmetric = of(Some(Symmetry::Rotational));
+        assert!(symmetric.influence().is_none());
+        without.extend(asked(&of(None), exponent));
+        with.extend(asked(&symmetric, exponent));
+        // The same all round, and so is its u.
+        let along = |phi_rad| {
+            let found = symmetric.radiance(&Ray { x_m: 0.0, y_m: 0.015, theta_rad: 0.9, phi_rad });
+            (found.value, found.u)
+        };
+        let ((value, u), (other_value, other_u)) = (along(0.2), along(2.9));
+        assert!(
+            (value - other_value).abs() < 1e-9 && (u / other_u - 1.0).abs() < 1e-6,
+            "{u} {other_u}"
+        );
+    }
+    let covered = |all: &[(f64, f64)]| {
+        let holds = all.iter().filter(|(error, u)| error.abs() <= 1.96 * u).count();
+        holds as f64 / all.len() as f64
+    };
+    assert!(covered(&with) >= 0.92, "{} {}", covered(&with), covered(&without));
+    // Off the axis the symmetry says more than the readings of one azimuth do.
+    let sum = |all: &[(f64, f64)]| all.iter().skip(4).step_by(6).map(|(_, u)| u).sum::<f64>();
+    assert!(sum(&with) < sum(&without), "{} {}", sum(&with), sum(&without));
 }

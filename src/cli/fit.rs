@@ -259,7 +259,6 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     let (samples, limits) = input.fit_readings(args.u_relative);
     let readings = Readings { limits: &limits, common: &common, ..Readings::of(&samples) };
     let ruled = fit::fit_wished(&readings, &region, &wish, optics.as_ref()).map_err(refused)?;
-    let ruled = ruled.with_truncation(&readings, optics.as_ref()).map_err(refused)?;
     let fit = &ruled.fit;
     let resolves = Resolves::of(&samples, &region, fit.basis(), optics.as_ref());
     let mut notes = vec![note_on_u(input.has_u(), args.u_relative)];

@@ -48,7 +48,9 @@ impl Fit {
     /// The fit with what its functions can't follow in every u. To be called with what
     /// [`fit_flown`](crate::fit_flown) made the fit of. A fit that nothing finer makes likelier is
     /// left without [`Parts::truncation`](crate::Parts::truncation); one that was stored and taken up again stays as it is, as
-    /// does one in a chart other than the surface one.
+    /// does one in a chart other than the surface one, and one so fine that what is finer has more
+    /// than 320 functions wherever in position it is the same: hemispherical harmonics from degree
+    /// 20 on, Zernike polynomials from degree 87 on.
     /// Costs one or two passes of a design that is two to five times as wide as the fit's.
     pub fn with_truncation(
         self,
@@ -57,7 +59,9 @@ impl Fit {
         common: &[Common],
         optics: Option<&Optics>,
     ) -> Result<Self, FitError> {
-        let Some(influence) = self.influence() else { return Ok(self) };
+        let (Some(influence), Some(weighed)) = (self.influence(), self.weighed()) else {
+            return Ok(self);
+        };
         let Some(spec) = finer(&self, samples) else { return Ok(self) };
         if influence.variances.len() != samples.len() {
             return Ok(self);
@@ -71,6 +75,7 @@ impl Fit {
             prior: Prior::new(self.functions(), self.penalty())?,
             shared,
             values: &influence.values,
+            weighed,
             beyond: design,
             kept: kept(self.basis(), spec),
         };
@@ -117,7 +122,10 @@ impl Shared {
     }
 }
 
-/// Functions that follow what a fit's own can't.
+/// Functions that follow what a fit's own can't: finer ones of the direction, and where places tell
+/// more of the position. Where they would be too many, finer ones of the direction matter more: as
+/// fine in position as leaves room for two degrees more in direction. `None` where even the same
+/// everywhere they are too many, see [`Fit::with_truncation`].
 fn finer(fit: &Fit, samples: &[Sample]) -> Option<BasisSpec> {
     let own = fit.basis();
     let degree = match own.angular {
@@ -129,23 +137,29 @@ fn finer(fit: &Fit, samples: &[Sample]) -> Option<BasisSpec> {
     let grid = Grid::of(samples, fit.region());
     let distinct = grid.x_m.len().max(grid.y_m.len());
     let position = own.position.degree().unwrap_or(0);
-    let position = position.max((position + 1).min(distinct.saturating_sub(1)));
-    let spec = |degree| BasisSpec {
+    let most = position.max((position + 1).min(distinct.saturating_sub(1)));
+    let spec = |degree, position| BasisSpec {
         angular: Angular::Zernike { degree, cosine_columns: COSINE_COLUMNS },
         position: Position::Legendre { degree: position },
     };
-    (degree + 2..=degree + DEGREES).rev().map(spec).find(|spec| spec.len() <= FUNCTIONS_MAX)
+    let degrees = (degree + 2..=degree + DEGREES).rev();
+    let specs = (0..=most).rev().flat_map(|at| degrees.clone().map(move |degree| spec(degree, at)));
+    let is_affordable =
+        |spec: &BasisSpec| spec.checked_len().is_ok() && kept(own, *spec).len() <= FUNCTIONS_MAX;
+    specs.into_iter().find(is_affordable)
 }
 
 /// Those of the finer functions that the fit doesn't have itself.
 fn kept(own: BasisSpec, beyond: BasisSpec) -> Vec<usize> {
     let width = beyond.angular.len();
     let all = 0..beyond.len();
-    let (Angular::Zernike { degree, cosine_columns }, Position::Legendre { .. }) =
-        (own.angular, own.position)
-    else {
-        return all.collect();
+    // Even harmonics are the same polynomials on the disk.
+    let (degree, cosine_columns) = match own.angular {
+        Angular::Zernike { degree, cosine_columns } => (degree, cosine_columns),
+        Angular::EvenHarmonics { degree } => (degree, 0),
+        _ => return all.collect(),
     };
+    let Position::Legendre { .. } = own.position else { return all.collect() };
     let polynomials = width - COSINE_COLUMNS;
     let is_own = |k: &usize| {
         let (q, j) = (k / width, k % width);
@@ -163,7 +177,7 @@ fn kept(own: BasisSpec, beyond: BasisSpec) -> Vec<usize> {
 const DEGREES: usize = 8;
 /// Of the finer functions beside splines.
 const OF_SPLINES: usize = 12;
-/// Finer functions at most.
+/// Finer functions at most that the fit doesn't have itself.
 const FUNCTIONS_MAX: usize = 320;
 /// Against slow convergence at the horizon.
 const COSINE_COLUMNS: usize = 2;

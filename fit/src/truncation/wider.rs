@@ -9,7 +9,7 @@ use crate::parts::Parts;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::has_unknown;
-use crate::{Fit, FitError, Influence};
+use crate::{Fit, FitError, Influence, Weighed};
 use faer::Mat;
 use std::ops::RangeInclusive;
 
@@ -21,6 +21,7 @@ pub(super) struct Wider<'s> {
     pub(super) shared: Shared,
     /// What the samples count as having read.
     pub(super) values: &'s [f64],
+    pub(super) weighed: &'s Weighed,
     pub(super) beyond: Design<'s>,
     /// The finer functions that aren't the fit's own.
     pub(super) kept: Vec<usize>,
@@ -40,6 +41,7 @@ impl Wider<'_> {
     /// would.
     pub(super) fn likeliest(&self, influence: &Influence) -> Result<(Joint, Likeliest), FitError> {
         let Influence { variances, excess, stated, .. } = influence;
+        let (variances, stated) = (&self.heard(variances), &self.heard(stated));
         let joint = self.joint(variances)?;
         if *excess == 0.0 {
             let found = self.at_scales(&joint, 1.0..=1.0)?;
@@ -47,7 +49,8 @@ impl Wider<'_> {
         }
         // The misfit may be what the functions can't follow, noise that isn't stated, or both.
         let is_unknown = has_unknown(self.own.samples());
-        let ratios = stated.iter().zip(variances).map(|(stated, all)| stated / all);
+        let both = stated.iter().zip(variances).filter(|(_, all)| all.is_finite());
+        let ratios = both.map(|(stated, all)| stated / all);
         let least = ratios.fold(1.0, f64::min);
         let least = if is_unknown { SCALE_LEAST } else { least.max(SCALE_LEAST) };
         let found = self.at_scales(&joint, least..=1.0)?;
@@ -58,6 +61,16 @@ impl Wider<'_> {
         let by_stated = self.at_scales(&other, 1.0..=f64::MAX)?;
         let is_better = by_stated.deviance < found.deviance;
         Ok(if is_better { (other, by_stated) } else { (joint, found) })
+    }
+
+    /// The variances with infinite ones of outliers: by their residuals they would be taken for what
+    /// the functions can't follow, since Huber's weight leaves the more of their squares the larger
+    /// they are.
+    fn heard(&self, variances: &[f64]) -> Vec<f64> {
+        let of = |(i, variance): (usize, &f64)| {
+            if self.weighed.is_outlier(i) { f64::INFINITY } else { *variance }
+        };
+        variances.iter().enumerate().map(of).collect()
     }
 
     /// One pass of all rows, each divided by its standard uncertainty.
@@ -223,31 +236,38 @@ impl Wider<'_> {
         let rough = self.rough(fit, &variances);
         let influence =
             fit.influence().map(|influence| influence.under(variances, &self.own, &factor));
+        // Of reweighed readings the coefficients scatter by other than their weights say.
+        let inflation = self.weighed.robust.inflation().sqrt();
+        let factor = factor.into_iter().map(|value| inflation * value).collect();
         let mut parts = Parts { factor, truncation, ..fit.parts().clone() };
         if is_wider {
             parts.model.truncation = rough;
         }
         let wider = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
-        let mut wider = wider.with_measured(fit.measured().cloned());
+        let mut wider =
+            wider.with_measured(fit.measured().cloned()).with_weighed(self.weighed.clone());
         if let Some(influence) = influence {
             wider = wider.with_influence(influence);
-        }
-        if let Some(weighed) = fit.weighed() {
-            wider = wider.with_weighed(weighed.clone());
         }
         Ok(wider)
     }
 
     /// Standard deviation of what is left beyond the stated noise. Where finer functions are called
-    /// for at all, it is taken for what is finer still: the field's own, along a ray.
+    /// for at all, it is taken for what is finer still: the field's own, along a ray. Each reading
+    /// says as much of it as its weight is; limits say nothing.
     fn rough(&self, fit: &Fit, variances: &[f64]) -> f64 {
         let Some(influence) = fit.influence() else { return 0.0 };
         if has_unknown(self.own.samples()) {
             return 0.0;
         }
-        let both = variances.iter().zip(&influence.stated).filter(|(all, _)| all.is_finite());
-        let beyond: f64 = both.map(|(all, stated)| all - stated).sum();
-        (beyond / variances.len() as f64).max(0.0).sqrt()
+        let (mut beyond, mut count) = (0.0, 0.0_f64);
+        for (i, (all, stated)) in variances.iter().zip(&influence.stated).enumerate() {
+            if all.is_finite() && self.weighed.limits.binary_search(&i).is_err() {
+                beyond += self.weighed.weights[i] * (all - stated);
+                count += 1.0;
+            }
+        }
+        (beyond / count.max(1.0)).max(0.0).sqrt()
     }
 
     /// The reported fit less the wider one, but for what the shared components do to both.

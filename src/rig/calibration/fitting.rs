@@ -49,7 +49,6 @@ impl Calibrated {
         let flown = self.flown(&input);
         let readings = input.readings(&flown);
         let ruled = fit::fit_wished(&readings, region, wish, optics)?;
-        let ruled = ruled.with_truncation(&readings, optics)?;
         Ok(self.fitted(input, ruled, region, optics))
     }
 
