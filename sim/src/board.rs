@@ -2,16 +2,17 @@
 //! sees the scene from where the axes really stand.
 
 use core::time::Duration;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use firmware_protocol::{AxisIdentity, Board, BoardFault, Illumination, Instant, Shutter};
 
-use crate::Compiled;
 use crate::chance::mix;
 use crate::mechanics::{Axis, SeenRay, passing};
 use crate::optics;
 use crate::stage::Stages;
 use crate::time::Interval;
+use crate::{Compiled, Nominal};
 
 /// A simulated rig's hardware. It answers after the fact, so that a device core is woken when
 /// something ends and not for every ADC reading.
@@ -29,6 +30,10 @@ pub struct SimulatedBoard {
     /// The time of one ADC reading.
     reading_s: f64,
     dwell: Dwelling,
+    /// How a shutter that no command of a dwell names stands.
+    shutter: Shutter,
+    /// How often a reading was named at each place.
+    visits: BTreeMap<u64, u32>,
 }
 
 /// What the detector sees while it dwells.
@@ -71,8 +76,40 @@ impl SimulatedBoard {
             stages: compiled.stages(),
             reading_s: 1.0 / f64::from(nominal.detector.adc_rate_hz),
             dwell: Dwelling::new(Illumination { reading: 0, gain: 0, shutter: Shutter::Closed }),
+            shutter: Shutter::Open,
+            visits: BTreeMap::new(),
             compiled,
         }
+    }
+
+    /// Puts a shutter that is moved apart from the readings: by an output of another device.
+    pub fn put_shutter(&mut self, shutter: Shutter) {
+        self.shutter = shutter;
+        self.dwell.current_a = None;
+    }
+
+    /// How that shutter stands.
+    pub const fn shutter(&self) -> Shutter {
+        self.shutter
+    }
+
+    /// A name for a reading that its meter has none for: by where the axes were sent, the range,
+    /// the shutter, and how often such a reading was named before. Noise is keyed by names, and so
+    /// depends on what was measured, and not on when.
+    #[allow(clippy::cast_possible_truncation)] // a number among 2^32
+    pub fn name_reading(&mut self, gain: u8) -> u32 {
+        let closed = u64::from(self.shutter == Shutter::Closed);
+        let place = self.axes.iter().fold(u64::from(gain) << 1 | closed, |key, axis| {
+            mix(key ^ u64::from(axis.readback(Instant::ZERO, false).cast_unsigned()))
+        });
+        let visits = self.visits.entry(place).or_default();
+        *visits = visits.wrapping_add(1);
+        mix(place ^ u64::from(*visits)) as u32
+    }
+
+    /// The rig file's description of the rig.
+    pub fn nominal(&self) -> &Nominal {
+        &self.compiled.nominal
     }
 
     /// The ray that the detector really sees.

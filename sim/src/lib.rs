@@ -19,6 +19,8 @@ mod detector;
 mod dynamixel;
 mod effect;
 mod field;
+mod grbl;
+mod keithley;
 mod levels;
 mod light;
 mod mechanics;
@@ -44,6 +46,8 @@ pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
 pub use dynamixel::{DynamixelBus, ServoFault, ServoSetting};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use field::Ray;
+pub use grbl::GrblTwin;
+pub use keithley::KeithleyTwin;
 pub use mechanics::{
     AxisFlaws, EncoderError, Misalignment, MissedSteps, Ringing, SeenRay, Uncertain,
 };
