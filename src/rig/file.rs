@@ -13,7 +13,7 @@ use spanned_toml::{Bounds, Document, Problem, Source, Table};
 use super::alignment::Alignment;
 use super::axis::{Approach, Axis, Readback};
 use super::detector::{Adc, Detector, Gain, Quantity};
-use super::{AXES, AxisName, Link, Rig};
+use super::{AXES, AxisName, Devices, Link, Rig};
 
 /// The rig behind `rig = "simulated"`.
 const BUILT_IN: &str = include_str!("simulated.toml");
@@ -46,6 +46,8 @@ impl Rig {
         let detector = read_detector(root.required_table("detector")?)?;
         let link = Link::read(root.required_table("link")?)?;
         let is_simulated = matches!(link, Link::Simulated { .. });
+        let devices = Devices::read(&root, !is_simulated)?;
+        check_devices(&root, &link, devices.as_ref())?;
         if is_simulated {
             root.leave("simulated");
         } else if root.has("simulated") {
@@ -57,12 +59,42 @@ impl Rig {
             ));
         }
         root.finish()?;
-        Ok(Self { name, axes, alignment, detector, link, document })
+        Ok(Self { name, axes, alignment, detector, link, devices, document })
     }
 
     /// The built-in simulated rig, which `rig = "simulated"` names.
     pub fn built_in() -> Result<Self, Problem> {
         Self::read(Document::parse(Source::new("the built-in rig", BUILT_IN))?)
+    }
+}
+
+/// Devices and the word for them go together, and each axis is moved by one.
+fn check_devices(root: &Table<'_>, link: &Link, devices: Option<&Devices>) -> Result<(), Problem> {
+    let Some(devices) = devices else {
+        return match link {
+            Link::Devices => Err(root.missing(
+                "axes_link",
+                "[[axes_link]] and [photometer] where link.kind is \"devices\"",
+            )),
+            _ => Ok(()),
+        };
+    };
+    if matches!(link, Link::Serial { .. }) {
+        return Err(root.problem(
+            "link",
+            "[[axes_link]] in the file of a rig with one controller",
+            "link.kind = \"devices\" or \"simulated\" beside [[axes_link]]",
+            "set link.kind to \"devices\", or remove [[axes_link]] and [photometer]",
+        ));
+    }
+    match AXES.into_iter().find(|axis| devices.place_of(*axis).is_none()) {
+        None => Ok(()),
+        Some(axis) => Err(root.problem(
+            "axes_link",
+            &format!("no device moves {}", axis.name()),
+            "each of theta, phi, x and y in one [[axes_link]]",
+            "say which device moves it",
+        )),
     }
 }
 

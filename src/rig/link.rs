@@ -13,6 +13,8 @@ const BOOT_WAIT_MS_DEFAULT: u64 = 2_000;
 /// The wire to the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Link {
+    /// Several devices, each on a port of its own: see [`super::Devices`].
+    Devices,
     /// A simulated rig in this process; its wire is paced at this rate.
     Simulated {
         /// Bits a second, ten to the byte.
@@ -34,24 +36,39 @@ pub enum Link {
 impl Link {
     /// Reads the table `[link]`.
     ///
-    /// `kind` is `"simulated"` or `"serial"`; `baud` defaults to one million; a serial link needs
-    /// `port`, and takes `reset_on_open` (default false) and `boot_wait_ms` (default 2000 where
-    /// opening resets the board).
+    /// `kind` is `"simulated"`, `"serial"` or `"devices"`, whose ports are in tables of their own;
+    /// `baud` defaults to one million; a serial link needs `port`, and takes `reset_on_open`
+    /// (default false) and `boot_wait_ms` (default 2000 where opening resets the board).
     pub(super) fn read(table: Table<'_>) -> Result<Self, Problem> {
-        let is_serial = table.required_choice("kind", &[("simulated", false), ("serial", true)])?;
+        let kinds =
+            [("simulated", Kind::Simulated), ("serial", Kind::Serial), ("devices", Kind::Devices)];
+        let kind = table.required_choice("kind", &kinds)?;
+        if kind == Kind::Devices {
+            table.finish()?;
+            return Ok(Self::Devices);
+        }
         let baud = table.integer("baud", BAUD)?;
         let baud = baud.map_or(BAUD_DEFAULT, |baud| u32::try_from(baud).unwrap_or(BAUD_DEFAULT));
+        let is_serial = kind == Kind::Serial;
         let link = if is_serial { serial(&table, baud)? } else { Self::Simulated { baud } };
         table.finish()?;
         Ok(link)
     }
 
-    /// Bits a second.
+    /// Bits a second; of several devices none speaks for all, and the rate is the default.
     pub fn baud(&self) -> u32 {
         match self {
+            Self::Devices => BAUD_DEFAULT,
             Self::Simulated { baud } | Self::Serial { baud, .. } => *baud,
         }
     }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Devices,
+    Serial,
+    Simulated,
 }
 
 fn serial(table: &Table<'_>, baud: u32) -> Result<Link, Problem> {

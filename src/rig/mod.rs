@@ -8,6 +8,7 @@ mod alignment;
 mod axis;
 pub mod calibration;
 mod detector;
+mod devices;
 mod file;
 #[cfg(test)]
 mod file_tests;
@@ -20,6 +21,9 @@ mod reading;
 pub use alignment::{Alignment, Misalignment};
 pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
+pub use devices::{
+    AxesDriver, AxesLink, Devices, GrblOutput, PhotometerDriver, PhotometerLink, Port,
+};
 pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
 pub use motion::{Flight, comes_to_rest, set_out};
@@ -41,6 +45,8 @@ pub struct Rig {
     pub detector: Detector,
     /// How it is reached.
     pub link: Link,
+    /// What it is put together of; `None` where a controller of gonio's own drives all of it.
+    pub devices: Option<Devices>,
     document: Document,
 }
 
