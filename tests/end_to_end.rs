@@ -13,7 +13,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use firmware_protocol::Status;
-use gonio::device::{Native, SerialSettings, serial_opener};
+use gonio::device::{Controller, SerialSettings, serial_opener};
 use gonio::journal::{EventKind, Order, Reader};
 use serde_json::Value;
 
@@ -188,7 +188,7 @@ impl Lab {
             let link = serial_opener(settings)().await.unwrap();
             // Each connection has a session of its own.
             let session = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().subsec_nanos();
-            let connected = Native::connect(link, session, BAUD, Duration::from_secs(3)).await;
+            let connected = Controller::connect(link, session, BAUD, Duration::from_secs(3)).await;
             connected.unwrap().0.status().await.unwrap()
         })
     }

@@ -12,10 +12,10 @@ use super::failure::Failure;
 use super::progress::ProgressLine;
 use super::session::draw_session;
 use super::setup::{Setup, Stage};
-use super::simulated::{SimulatedDevice, StopSignals};
-use crate::device::{Opener, SerialSettings, serial_opener};
+use super::simulated::{SimulatedDevice, SimulatedDevices, StopSignals};
+use crate::device::{Openers, SerialSettings, serial_opener};
 use crate::journal::{Journal, JournalError, Writer};
-use crate::rig::Link;
+use crate::rig::{Link, Port, Rig};
 use crate::run::{Ended, Happening, Job, Outcome, OwnerHandle, Source, StartError, Wish, own};
 
 /// The number of a session with a device that lives in this process alone.
@@ -70,21 +70,32 @@ impl Pace {
     }
 }
 
-/// The way to a rig; a simulated one is switched on here. Must be called on the runtime that the
-/// rig is to be driven on.
-pub(crate) fn opener_of(stage: Option<&Stage>, link: &Link) -> Opener {
-    match (stage, link) {
-        (Some(stage), link) => SimulatedDevice::switch_on(stage, link.baud()).opener(),
-        (None, Link::Serial { port, baud, reset_on_open, boot_wait }) => {
+/// The way to a rig, link by link; a simulated one is switched on here. Must be called on the
+/// runtime that the rig is to be driven on.
+pub(crate) fn openers_of(stage: Option<&Stage>, rig: &Rig) -> Openers {
+    match (stage, &rig.link, &rig.devices) {
+        (Some(stage), _, Some(devices)) => SimulatedDevices::switch_on(stage, devices).openers(),
+        (Some(stage), link, None) => SimulatedDevice::switch_on(stage, link.baud()).opener().into(),
+        (None, Link::Serial { port, baud, reset_on_open, boot_wait }, _) => {
             serial_opener(SerialSettings {
                 port: port.clone(),
                 baud: *baud,
                 reset_on_open: *reset_on_open,
                 boot_wait: *boot_wait,
             })
+            .into()
         }
-        (None, Link::Simulated { .. }) => unreachable!("a simulated rig has a stage"),
+        (None, Link::Devices, Some(devices)) => {
+            Openers(devices.ports().map(|port| serial_opener(settings(port))).collect())
+        }
+        (None, Link::Devices, None) => unreachable!("the rig reader demands devices"),
+        (None, Link::Simulated { .. }, _) => unreachable!("a simulated rig has a stage"),
     }
+}
+
+fn settings(port: &Port) -> SerialSettings {
+    let Port { path, baud, reset_on_open, boot_wait } = port.clone();
+    SerialSettings { port: path, baud, reset_on_open, boot_wait }
 }
 
 /// Reaches the rig; then lets `begin` make the journal and the job, and runs it to its end. A rig
@@ -95,7 +106,7 @@ pub(crate) fn acquire(
     begin: impl FnOnce() -> Result<(Journal, Job), Failure>,
 ) -> Result<Acquired, Failure> {
     pace.runtime()?.block_on(async {
-        let opener = opener_of(setup.stage.as_ref(), &setup.rig.link);
+        let opener = openers_of(setup.stage.as_ref(), &setup.rig);
         let (owner, task) = own(Arc::new(setup.rig.clone()), opener, pace.session());
         owner.look().await.map_err(Failure::start)?;
         let (journal, job) = begin()?;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use super::acquire::{Pace, opener_of};
+use super::acquire::{Pace, openers_of};
 use super::args::DaemonArgs;
 use super::client::default_address;
 use super::failure::{Failure, Outcome};
@@ -61,7 +61,7 @@ fn open_shop(args: &DaemonArgs) -> Result<Shop, Failure> {
 fn start_rig(shop: &Shop) -> Result<RigThread, Failure> {
     let (rig, stage) = (Arc::new(shop.rig.clone()), shop.stage.clone());
     RigThread::start(move || {
-        let opener = opener_of(stage.as_ref(), &rig.link);
+        let opener = openers_of(stage.as_ref(), &rig);
         own(rig, opener, draw_session())
     })
     .map_err(|error| Failure::start(format!("the rig's thread: {error}")))

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::acquire::{Pace, opener_of};
+use super::acquire::{Pace, openers_of};
 use super::args::{HandArgs, JogArgs, ReadArgs};
 use super::client::Client;
 use super::failure::{Failure, Outcome};
@@ -156,7 +156,7 @@ impl Bench {
     ) -> Result<T, Failure> {
         let pace = if self.stage.is_some() { Pace::Virtual } else { Pace::Real };
         pace.runtime()?.block_on(async {
-            let opener = opener_of(self.stage.as_ref(), &self.rig.link);
+            let opener = openers_of(self.stage.as_ref(), &self.rig);
             let (owner, task) = own(Arc::new(self.rig.clone()), opener, pace.session());
             let done = hand(owner.clone()).await;
             owner.shut_down().await;

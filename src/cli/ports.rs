@@ -12,7 +12,7 @@ use super::failure::{Failure, Outcome};
 use super::output::{note, say, say_json};
 use super::session::draw_session;
 use super::text::table;
-use crate::device::{Native, SerialSettings, list_ports, open_serial};
+use crate::device::{Controller, SerialSettings, list_ports, open_serial};
 
 /// A board that was reset by opening its port listens after two or three seconds.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -49,8 +49,9 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
     };
     let identity = runtime.block_on(async {
         let link = open_serial(&settings).await.map_err(Failure::start)?;
-        let (_, identity) =
-            Native::connect(link, draw_session(), baud, PATIENCE).await.map_err(Failure::start)?;
+        let (_, identity) = Controller::connect(link, draw_session(), baud, PATIENCE)
+            .await
+            .map_err(Failure::start)?;
         Ok::<_, Failure>(identity)
     })?;
     if is_json {

@@ -1,6 +1,7 @@
 //! The simulated device on a byte stream: in this process for a run, or on a pseudo-terminal for
 //! anybody (`gonio sim`).
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -16,7 +17,8 @@ use super::inputs::{BUILT_IN, Inputs};
 use super::output::{note, say};
 use super::session::draw_session;
 use super::setup::{Stage, no_scene, rig_at, stage_at};
-use crate::device::{Link, Opener, opener};
+use crate::device::{Link, Opener, Openers, opener};
+use crate::rig::{AXES, AxesDriver, AxesLink, Devices, PhotometerDriver};
 
 /// Bytes that wait between host and wire: as much as a serial port's driver buffers.
 const STREAM_BYTES: usize = 4096;
@@ -54,6 +56,82 @@ impl SimulatedDevice {
             std::future::ready(Ok(Link::new("simulated rig", host)))
         })
     }
+}
+
+/// Simulated devices of other makes, switched on: every set of links leads to the same ones.
+#[derive(Debug, Clone)]
+pub(crate) struct SimulatedDevices {
+    streams: mpsc::UnboundedSender<(usize, DuplexStream)>,
+    lines: usize,
+}
+
+impl SimulatedDevices {
+    /// Switches them on around one board, as a task of the current runtime.
+    pub(crate) fn switch_on(stage: &Stage, devices: &Devices) -> Self {
+        let (streams, mut waiting) = mpsc::unbounded_channel::<(usize, DuplexStream)>();
+        let mut bench = bench(stage, devices, OWN_BOOT);
+        let lines = bench.lines();
+        tokio::spawn(async move {
+            let boot = Instant::now();
+            let mut plugged: BTreeMap<usize, DuplexStream> = BTreeMap::new();
+            while let Some((line, stream)) = waiting.recv().await {
+                plugged.insert(line, stream);
+                if plugged.len() == lines {
+                    let streams = std::mem::take(&mut plugged).into_values().collect();
+                    // Streams that end are a host that left; the next one may come.
+                    let _ = sim::serve_bench(streams, &mut bench, boot).await;
+                }
+            }
+        });
+        Self { streams, lines }
+    }
+
+    /// Links to them, as often as they are asked for. Those before must have been dropped.
+    pub(crate) fn openers(self) -> Openers {
+        let opener_to = |line: usize| {
+            let streams = self.streams.clone();
+            opener(move || {
+                let (host, device) = duplex(STREAM_BYTES);
+                let _ = streams.send((line, device));
+                std::future::ready(Ok(Link::new("simulated device", host)))
+            })
+        };
+        Openers((0..self.lines).map(opener_to).collect())
+    }
+}
+
+/// The devices of a rig file around one board, the meter as the last.
+fn bench(stage: &Stage, devices: &Devices, boot: u32) -> sim::Bench {
+    let board = sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot);
+    let nominal = board.nominal().clone();
+    let mut bench = sim::Bench::new(board);
+    for link in &devices.axes {
+        let wire = wire(stage, link.baud);
+        match &link.driver {
+            AxesDriver::Grbl { letters, .. } => {
+                let twin = sim::GrblTwin::new(&nominal, &by_letter(letters, link));
+                bench.plug(twin, wire);
+            }
+        }
+    }
+    let wire = wire(stage, devices.photometer.baud);
+    match devices.photometer.driver {
+        PhotometerDriver::Keithley6485 => bench.plug(sim::KeithleyTwin::new(), wire),
+    };
+    bench
+}
+
+/// What a grbl's axes move, in its own order: the place in the rig, and the zero in degrees or
+/// millimetres.
+fn by_letter(letters: &[char], link: &AxesLink) -> Vec<(usize, f64)> {
+    let mut axes: Vec<(char, usize, f64)> = Vec::new();
+    for ((letter, name), zero) in letters.iter().zip(&link.axes).zip(&link.zeros) {
+        let place = AXES.iter().position(|axis| axis == name).unwrap_or_default();
+        let zero = if name.is_rotary() { zero.to_degrees() } else { zero * 1e3 };
+        axes.push((*letter, place, zero));
+    }
+    axes.sort_by_key(|(letter, ..)| "XYZABCUVW".find(*letter));
+    axes.into_iter().map(|(_, place, zero)| (place, zero)).collect()
 }
 
 fn device(stage: &Stage, boot: u32) -> Device<sim::SimulatedBoard> {

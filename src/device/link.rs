@@ -36,6 +36,16 @@ pub type Opening = Pin<Box<dyn Future<Output = Result<Link, SerialError>> + Send
 /// Opens the link to one device, as often as it is asked to: after a lost one too.
 pub type Opener = Box<dyn FnMut() -> Opening + Send>;
 
+/// How the links to a rig's devices are opened: one to a controller of gonio's own, or one to each
+/// of the devices that the rig file lists, in its order, the photometer's last.
+pub struct Openers(pub Vec<Opener>);
+
+impl From<Opener> for Openers {
+    fn from(opener: Opener) -> Self {
+        Self(vec![opener])
+    }
+}
+
 /// Makes an [`Opener`] of a closure.
 pub fn opener<F, O>(mut open: F) -> Opener
 where

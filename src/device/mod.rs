@@ -1,16 +1,35 @@
 //! How hardware is spoken to: links, which know bytes, and drivers, which know what bytes mean to
 //! one kind of device. A simulated rig is one more link; nothing here can tell.
 //!
+//! [`Controller`] is what a run drives. Behind it stands a controller of gonio's own ([`native`]),
+//! or a [`Composer`] with a driver for each of several devices: [`Axes`] move, a [`Photometer`]
+//! reads.
+//!
 //! This room does not know poses, radiance or files.
 
 mod agreement;
+mod axes;
+mod composed;
+mod controller;
+mod driver;
+mod grbl;
+mod keithley;
 mod link;
 mod native;
+mod photometer;
 mod ports;
 mod serial;
 
 pub use agreement::{Disagreement, QUEUE_DEPTH_MIN, check_agreement};
-pub use link::{Link, Opener, Opening, opener};
-pub use native::{ConnectError, DeviceEvent, LinkLost, Native};
+pub use axes::{Axes, AxesCommand, AxesEvent, AxesFacts, AxisFacts, Located};
+pub use composed::Composer;
+pub use controller::{ConnectError, Controller, DeviceEvent, LinkLost};
+pub use driver::{Driver, NamedFault, Promises, Refusal, Trouble};
+pub use grbl::Grbl;
+pub use keithley::Keithley;
+pub use link::{Link, Opener, Openers, Opening, opener};
+pub use photometer::{
+    Exposed, Exposure, Photometer, PhotometerCommand, PhotometerEvent, PhotometerFacts,
+};
 pub use ports::{PortEntry, list_ports};
 pub use serial::{SerialError, SerialSettings, open_serial, serial_opener};

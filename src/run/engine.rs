@@ -135,7 +135,7 @@ impl<'a> Engine<'a> {
         let until = until.into_iter().chain(tell_at).min();
         let rule = self.rule.as_mut();
         let decider = self.decider.as_mut();
-        let native = self.hardware.native.as_mut();
+        let controller = self.hardware.controller.as_mut();
         tokio::select! {
             biased;
             order = self.orders.recv(), if !self.desk.is_closing => Woken::Order(order),
@@ -143,8 +143,8 @@ impl<'a> Engine<'a> {
                 Woken::TimedOut
             }
             event = async {
-                match native {
-                    Some(native) => native.next_event().await,
+                match controller {
+                    Some(controller) => controller.next_event().await,
                     None => std::future::pending().await,
                 }
             } => Woken::Device(event),
@@ -277,11 +277,12 @@ impl<'a> Engine<'a> {
             DeviceEvent::Event(event) => Input::Event(event),
             DeviceEvent::LinkLost(lost) => {
                 if matches!(lost, LinkLost::HungUp { .. }) {
-                    self.hardware.native = None;
+                    self.hardware.let_go();
                 }
                 Input::Fault(Fault::LinkLost(lost.to_string()))
             }
             DeviceEvent::Restarted { .. } => Input::Fault(Fault::Restarted),
+            DeviceEvent::Fault(fault) => Input::Fault(Fault::Named(fault)),
             DeviceEvent::Reply { request, reply, retries } => match reply {
                 Reply::Accepted(id) => {
                     if retries > 0 {
@@ -315,8 +316,8 @@ impl<'a> Engine<'a> {
         while let Some(action) = self.machine.poll_action() {
             match action {
                 Action::Send(request) => {
-                    if let Some(native) = &self.hardware.native {
-                        native.submit(request);
+                    if let Some(controller) = &self.hardware.controller {
+                        controller.submit(request);
                     }
                 }
                 Action::Record(taken) => self.take(*taken),
@@ -445,8 +446,8 @@ impl<'a> Engine<'a> {
     }
 
     fn tell_link(&mut self) {
-        if let Some(native) = &self.hardware.native {
-            let statistics = native.statistics();
+        if let Some(controller) = &self.hardware.controller {
+            let statistics = controller.statistics();
             self.desk.tell(Happening::Link(statistics));
         }
     }

@@ -16,7 +16,7 @@ use super::hardware::{Hardware, ReachError};
 use super::machine::{Answer, Wish};
 use super::reading::{Taking, reading};
 use super::state::{Doubt, Fault, Position, State};
-use crate::device::{DeviceEvent, Native};
+use crate::device::{Controller, DeviceEvent, NamedFault};
 use crate::plan::Step;
 use crate::rig::{Latched, LimitError, Reading, ReadingKind};
 
@@ -29,6 +29,9 @@ pub enum HandError {
     /// The device stopped by itself, or was stopped.
     #[error("{}", Fault::Device(*.0))]
     Failed(Cause),
+    /// One of the rig's devices stands still, and says why.
+    #[error("{0}")]
+    Fault(NamedFault),
     /// The owner has ended.
     #[error("the owner of the rig has ended")]
     Gone,
@@ -170,8 +173,8 @@ impl Hand<'_> {
     }
 
     pub(super) async fn look(&mut self) -> Result<Stand, HandError> {
-        let status = match &mut self.hardware.native {
-            Some(native) => native.status().await.ok(),
+        let status = match &mut self.hardware.controller {
+            Some(controller) => controller.status().await.ok(),
             None => None,
         };
         let status = match status {
@@ -198,10 +201,10 @@ impl Hand<'_> {
     async fn begin(&mut self) -> Result<(CommandId, Status), HandError> {
         let status = self.hardware.reach().await?.status;
         if status.fault.is_some() {
-            let native = self.native()?;
-            native.submit(Request::ClearFault);
+            let controller = self.controller()?;
+            controller.submit(Request::ClearFault);
             loop {
-                match native.next_event().await {
+                match controller.next_event().await {
                     DeviceEvent::Reply { reply: Reply::Cleared, .. } => break,
                     DeviceEvent::Reply { reply: Reply::Rejected(_, why), .. } => {
                         return Err(HandError::Refused(why));
@@ -210,7 +213,7 @@ impl Hand<'_> {
                     DeviceEvent::Restarted { .. } => {
                         return Err(HandError::Link(Fault::Restarted.to_string()));
                     }
-                    DeviceEvent::Reply { .. } | DeviceEvent::Event(_) => {}
+                    DeviceEvent::Reply { .. } | DeviceEvent::Event(_) | DeviceEvent::Fault(_) => {}
                 }
             }
         }
@@ -218,8 +221,8 @@ impl Hand<'_> {
         Ok((CommandId(id), status))
     }
 
-    fn native(&mut self) -> Result<&mut Native, HandError> {
-        self.hardware.native.as_mut().ok_or_else(|| HandError::Link("no link".to_owned()))
+    fn controller(&mut self) -> Result<&mut Controller, HandError> {
+        self.hardware.controller.as_mut().ok_or_else(|| HandError::Link("no link".to_owned()))
     }
 
     /// One command, to its end; a dwell has a result. An abort stops it.
@@ -228,41 +231,41 @@ impl Hand<'_> {
         id: CommandId,
         request: Request,
     ) -> Result<Option<DwellResult>, HandError> {
-        let Some(native) = self.hardware.native.as_mut() else {
+        let Some(controller) = self.hardware.controller.as_mut() else {
             return Err(HandError::Link("no link".to_owned()));
         };
-        native.submit(request);
+        controller.submit(request);
         loop {
             let event = tokio::select! {
                 biased;
                 order = self.orders.recv() => {
                     match order {
                         Some(Order::Wish(Wish::Abort | Wish::Stop, reply)) => {
-                            native.stop();
+                            controller.stop();
                             let _ = reply.send(Some(Answer::Ending));
                         }
                         Some(Order::ShutDown) | None => {
                             self.desk.is_closing = true;
-                            native.stop();
+                            controller.stop();
                             return Err(HandError::Gone);
                         }
                         Some(other) => other.refuse(),
                     }
                     continue;
                 }
-                event = native.next_event() => event,
+                event = controller.next_event() => event,
             };
             match event {
                 DeviceEvent::Event(Event::Done(done)) if done.id == id => {
-                    native.acknowledge(id);
+                    controller.acknowledge(id);
                     return Ok(None);
                 }
                 DeviceEvent::Event(Event::Sampled(result)) if result.id == id => {
-                    native.acknowledge(id);
+                    controller.acknowledge(id);
                     return Ok(Some(result));
                 }
                 DeviceEvent::Event(Event::Failed(failed, cause, _)) if failed == id => {
-                    native.acknowledge(id);
+                    controller.acknowledge(id);
                     return Err(HandError::Failed(cause));
                 }
                 DeviceEvent::Reply { reply: Reply::Rejected(refused, why), .. }
@@ -274,6 +277,7 @@ impl Hand<'_> {
                 DeviceEvent::Restarted { .. } => {
                     return Err(HandError::Link(Fault::Restarted.to_string()));
                 }
+                DeviceEvent::Fault(fault) => return Err(HandError::Fault(fault)),
                 DeviceEvent::Event(_) | DeviceEvent::Reply { .. } => {}
             }
         }

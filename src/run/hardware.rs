@@ -5,8 +5,11 @@ use std::time::Duration;
 
 use firmware_protocol::{Identity, Status};
 use thiserror::Error;
+use tokio::task::JoinHandle;
 
-use crate::device::{ConnectError, Disagreement, Native, Opener, SerialError, check_agreement};
+use crate::device::{
+    Composer, ConnectError, Controller, Disagreement, Openers, SerialError, check_agreement,
+};
 use crate::rig::Rig;
 
 /// How long a device may take to answer to its name.
@@ -23,6 +26,9 @@ pub enum ReachError {
     /// Nobody answers on it, or somebody else does.
     #[error(transparent)]
     Connect(#[from] ConnectError),
+    /// Nothing opens a link.
+    #[error("the rig has no link to open")]
+    NoLink,
     /// A device answers, but not the one that the rig file describes.
     #[error("{0}; correct the rig file, or plug in its rig")]
     Disagrees(#[from] Disagreement),
@@ -42,43 +48,72 @@ pub(super) struct Reached {
 /// See the module.
 pub(super) struct Hardware {
     pub(super) rig: Arc<Rig>,
-    pub(super) native: Option<Native>,
-    opener: Opener,
+    pub(super) controller: Option<Controller>,
+    openers: Openers,
     session: u32,
+    // The task of the controller that was let go last: until it ends, the ports are its.
+    leaving: Option<JoinHandle<()>>,
 }
 
 impl Hardware {
-    pub(super) fn new(rig: Arc<Rig>, opener: Opener, session: u32) -> Self {
-        Self { rig, native: None, opener, session }
+    pub(super) fn new(rig: Arc<Rig>, openers: Openers, session: u32) -> Self {
+        Self { rig, controller: None, openers, session, leaving: None }
     }
 
-    /// Opens a session: over the link that there is, because opening a port resets some boards;
-    /// or else over a new one.
+    /// Opens a session: over the links that there are, because opening a port resets some boards;
+    /// or else over new ones.
     pub(super) async fn reach(&mut self) -> Result<Reached, ReachError> {
-        if let Some(mut native) = self.native.take()
-            && let Ok(identity) = native.identify(PATIENCE).await
-            && let Ok(status) = native.status().await
-            && let Ok(windows) = native.windows(&identity).await
-        {
-            check_agreement(&identity, &self.rig)?;
-            self.native = Some(native);
-            return Ok(Reached { identity, status, windows });
+        if let Some(mut controller) = self.controller.take() {
+            if let Ok(identity) = controller.identify(PATIENCE).await
+                && let Ok(status) = controller.status().await
+                && let Ok(windows) = controller.windows(&identity).await
+            {
+                check_agreement(&identity, &self.rig)?;
+                self.controller = Some(controller);
+                return Ok(Reached { identity, status, windows });
+            }
+            self.leaving = Some(controller.let_go());
         }
-        let link = (self.opener)().await?;
+        self.gone().await;
         self.session = self.session.wrapping_add(SESSION_STRIDE);
-        let baud = self.rig.link.baud();
-        let (mut native, identity) = Native::connect(link, self.session, baud, PATIENCE).await?;
+        let (mut controller, identity) = self.connect().await?;
         check_agreement(&identity, &self.rig)?;
-        let status = native.status().await?;
-        let windows = native.windows(&identity).await?;
-        self.native = Some(native);
+        let status = controller.status().await?;
+        let windows = controller.windows(&identity).await?;
+        self.controller = Some(controller);
         Ok(Reached { identity, status, windows })
     }
 
-    /// Lets go of the link, after stopping what may move.
+    async fn connect(&mut self) -> Result<(Controller, Identity), ReachError> {
+        let mut links = Vec::new();
+        for open in &mut self.openers.0 {
+            links.push(open().await?);
+        }
+        if let Some(composer) = Composer::of(&self.rig, self.session) {
+            return Ok(Controller::compose(composer, links).await?);
+        }
+        let link = links.pop().ok_or(ReachError::NoLink)?;
+        let baud = self.rig.link.baud();
+        Ok(Controller::connect(link, self.session, baud, PATIENCE).await?)
+    }
+
+    /// Lets go of the links, after stopping what may move; returns before that is done.
+    pub(super) fn let_go(&mut self) {
+        if let Some(controller) = self.controller.take() {
+            self.leaving = Some(controller.let_go());
+        }
+    }
+
+    /// As [`Hardware::let_go`], and waits for it.
     pub(super) async fn close(&mut self) {
-        if let Some(native) = self.native.take() {
-            native.close().await;
+        self.let_go();
+        self.gone().await;
+    }
+
+    /// Waits until nobody of ours has the ports any more.
+    async fn gone(&mut self) {
+        if let Some(task) = self.leaving.take() {
+            let _ = task.await;
         }
     }
 }

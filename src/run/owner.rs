@@ -15,7 +15,7 @@ use super::hand::{Hand, HandError, Stand, TakeOne};
 use super::hardware::Hardware;
 use super::job::{Ended, Job};
 use super::machine::{Answer, Wish};
-use crate::device::Opener;
+use crate::device::Openers;
 use crate::journal::Writer;
 use crate::rig::{Latched, Reading, Rig};
 
@@ -56,7 +56,12 @@ pub struct OwnerHandle {
 
 /// Starts an owner on the runtime that this is called in. `session` numbers its first session on
 /// the wire, and is to be drawn anew by every process; a simulated rig's may come from its seed.
-pub fn own(rig: Arc<Rig>, opener: Opener, session: u32) -> (OwnerHandle, JoinHandle<()>) {
+pub fn own(
+    rig: Arc<Rig>,
+    openers: impl Into<Openers>,
+    session: u32,
+) -> (OwnerHandle, JoinHandle<()>) {
+    let openers = openers.into();
     let (sender, mut orders) = mpsc::channel(ORDERS);
     let mut desk = Desk::new();
     let handle = OwnerHandle {
@@ -65,7 +70,7 @@ pub fn own(rig: Arc<Rig>, opener: Opener, session: u32) -> (OwnerHandle, JoinHan
         status: desk.status.subscribe(),
     };
     let task = tokio::spawn(async move {
-        let mut hardware = Hardware::new(rig, opener, session);
+        let mut hardware = Hardware::new(rig, openers, session);
         while !desk.is_closing {
             let Some(order) = orders.recv().await else { break };
             serve(order, &mut hardware, &mut orders, &mut desk).await;

@@ -6,6 +6,8 @@ use std::fmt;
 
 use firmware_protocol::{Cause, Rejection};
 
+use crate::device::NamedFault;
+
 /// What the rig does for a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum State {
@@ -145,6 +147,8 @@ impl fmt::Display for Position {
 pub enum Fault {
     /// The device stopped by itself.
     Device(Cause),
+    /// One of the rig's devices stopped by itself, and has a name for why.
+    Named(NamedFault),
     /// The device refused a command.
     Refused(Rejection),
     /// The link was lost: what the driver said.
@@ -173,6 +177,9 @@ impl Fault {
             Self::Device(
                 cause @ (Cause::HomingMissed(_) | Cause::LimitSwitch(_) | Cause::Stalled(_)),
             ) => Some(Doubt::Upset(*cause)),
+            Self::Named(NamedFault { cause, loses_position: true, .. }) => {
+                Some(Doubt::Upset(*cause))
+            }
             Self::Refused(Rejection::Unhomed(_)) => Some(Doubt::NotHomed),
             Self::LinkLost(_) | Self::Restarted => Some(Doubt::LinkLost),
             _ => None,
@@ -189,6 +196,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(cause) => describe_cause(*cause, f),
+            Self::Named(fault) => fault.fmt(f),
             Self::Refused(rejection) => describe_rejection(*rejection, f),
             Self::LinkLost(why) => write!(f, "link lost: {why}"),
             Self::Restarted => f.write_str("the device restarted: power, or its reset line"),

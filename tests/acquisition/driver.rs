@@ -10,7 +10,7 @@ use firmware_protocol::{
 };
 use tokio::io::duplex;
 
-use gonio::device::{ConnectError, DeviceEvent, Link, LinkLost, Native};
+use gonio::device::{ConnectError, Controller, DeviceEvent, Link, LinkLost};
 use gonio::rig::Rig;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
@@ -24,12 +24,14 @@ fn device() -> TestDevice {
     TestDevice::new(rig, BAUD, sim::LinkFaults::default())
 }
 
-async fn open(device: &TestDevice) -> (Native, Identity) {
+async fn open(device: &TestDevice) -> (Controller, Identity) {
     let stream = device.stream();
-    Native::connect(Link::new("simulated", stream), device.opened(), BAUD, DEADLINE).await.unwrap()
+    Controller::connect(Link::new("simulated", stream), device.opened(), BAUD, DEADLINE)
+        .await
+        .unwrap()
 }
 
-async fn result(native: &mut Native) -> Event {
+async fn result(native: &mut Controller) -> Event {
     loop {
         match native.next_event().await {
             DeviceEvent::Event(Event::Started(..)) | DeviceEvent::Reply { .. } => {}
@@ -109,7 +111,8 @@ async fn more_requests_than_the_window_keep_their_order() {
 #[tokio::test(start_paused = true)]
 async fn who_does_not_answer_is_named_for_what_was_heard() {
     let (silent, _far) = duplex(4096);
-    let error = Native::connect(Link::new("a port", silent), 1, BAUD, DEADLINE).await.unwrap_err();
+    let error =
+        Controller::connect(Link::new("a port", silent), 1, BAUD, DEADLINE).await.unwrap_err();
     assert!(matches!(error, ConnectError::Silent { .. }), "{error}");
 
     let (noisy, far) = duplex(4096);
@@ -120,12 +123,14 @@ async fn who_does_not_answer_is_named_for_what_was_heard() {
             let _ = to_host.write(b"Grbl 1.1h ['$' for help]\r\n\0").await;
         }
     });
-    let error = Native::connect(Link::new("a port", noisy), 1, BAUD, DEADLINE).await.unwrap_err();
+    let error =
+        Controller::connect(Link::new("a port", noisy), 1, BAUD, DEADLINE).await.unwrap_err();
     assert!(matches!(error, ConnectError::Garbled { .. }), "{error}");
 
     let (gone, far) = duplex(4096);
     drop(far);
-    let error = Native::connect(Link::new("a port", gone), 1, BAUD, DEADLINE).await.unwrap_err();
+    let error =
+        Controller::connect(Link::new("a port", gone), 1, BAUD, DEADLINE).await.unwrap_err();
     assert!(matches!(error, ConnectError::HungUp { .. }), "{error}");
 }
 

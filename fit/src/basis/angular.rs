@@ -26,11 +26,7 @@ pub(crate) enum Directions {
         even: Vec<usize>,
     },
     Splines(PolarSplines),
-    /// Over the whole sphere, or over the hemisphere alone: there they are not orthogonal.
-    Spherical {
-        all: SphericalHarmonics,
-        is_whole: bool,
-    },
+    Spherical(SphericalHarmonics),
     /// Functions of the ray: see [`super::Basis::direction_of`].
     SecondPlane(SecondPlane),
 }
@@ -66,10 +62,9 @@ impl Directions {
             Angular::Splines { theta_spans, phi_spans, fine } => {
                 Self::Splines(PolarSplines::new(theta_spans, phi_spans, fine).map_err(refused)?)
             }
-            Angular::Spherical { degree } => Self::Spherical {
-                all: SphericalHarmonics::new(degree).map_err(refused)?,
-                is_whole: chart.is_whole_sphere(),
-            },
+            Angular::Spherical { degree } => {
+                Self::Spherical(SphericalHarmonics::new(degree).map_err(refused)?)
+            }
             Angular::SecondPlane { degree } => {
                 Self::SecondPlane(SecondPlane::new(degree, chart)?.ok_or_else(foreign)?)
             }
@@ -84,7 +79,7 @@ impl Directions {
             Self::Hemispherical(harmonics) => harmonics.len(),
             Self::Even { even, .. } => even.len(),
             Self::Splines(splines) => splines.len(),
-            Self::Spherical { all, .. } => all.len(),
+            Self::Spherical(harmonics) => harmonics.len(),
             Self::SecondPlane(plane) => plane.len(),
         }
     }
@@ -121,7 +116,7 @@ impl Directions {
                 out.iter_mut().zip(even).for_each(|(out, k)| *out = room[*k]);
             }
             Self::Splines(splines) => splines.evaluate_direction(d, out),
-            Self::Spherical { all, .. } => all.evaluate(d, out),
+            Self::Spherical(harmonics) => harmonics.evaluate(d, out),
             // From the middle of the first plane, for want of a place.
             Self::SecondPlane(plane) => plane.evaluate((0.0, 0.0), d, &mut plane.lines(), out),
         }
@@ -141,7 +136,7 @@ impl Directions {
                 // In closed form where there is one.
                 zernike.integrals_within(theta_max_rad, &mut out[..zernike.len()])
             }
-            Self::Hemispherical(_) | Self::Even { .. } | Self::Spherical { .. } => {
+            Self::Hemispherical(_) | Self::Even { .. } | Self::Spherical(_) => {
                 self.integrate_rounds(theta_max_rad, out);
                 Ok(())
             }
@@ -157,7 +152,7 @@ impl Directions {
     /// rounding; the others have none.
     fn integrate_rounds(&self, theta_max_rad: f64, out: &mut [f64]) {
         out.fill(0.0);
-        let is_whole = matches!(self, Self::Spherical { is_whole: true, .. });
+        let is_whole = matches!(self, Self::Spherical(_));
         let low = libm::cos(theta_max_rad).max(if is_whole { -1.0 } else { 0.0 });
         let (middle, half) = (f64::midpoint(low, 1.0), (1.0 - low) / 2.0);
         let (mut values, mut room) = (vec![0.0; self.len()], self.room());
@@ -180,7 +175,7 @@ impl Directions {
         match self {
             Self::Zernike { zernike, .. } if k < zernike.len() => ansi_order(k),
             Self::Zernike { zernike, .. } => (2 * (k - zernike.len()) + 1, 0),
-            Self::Hemispherical(_) | Self::Spherical { .. } => {
+            Self::Hemispherical(_) | Self::Spherical(_) => {
                 let l = k.isqrt();
                 (l, signed(k) - signed(l * (l + 1)))
             }
@@ -211,7 +206,7 @@ impl Directions {
                 zernike.degree().max(cosine.as_ref().map_or(0, |c| 2 * c.columns))
             }
             Self::Hemispherical(harmonics) => 2 * harmonics.len().isqrt(),
-            Self::Even { all, .. } | Self::Spherical { all, .. } => all.degree(),
+            Self::Even { all, .. } | Self::Spherical(all) => all.degree(),
             Self::Splines(splines) => splines.fineness(),
             Self::SecondPlane(plane) => plane.degree(),
         }
@@ -222,7 +217,7 @@ impl Directions {
     pub(crate) fn mirrored_degree(&self) -> Option<usize> {
         match self {
             Self::Zernike { zernike, cosine: None } => Some(zernike.degree()),
-            Self::Even { all, .. } | Self::Spherical { all, is_whole: true } => Some(all.degree()),
+            Self::Even { all, .. } | Self::Spherical(all) => Some(all.degree()),
             _ => None,
         }
     }
@@ -233,7 +228,7 @@ impl Directions {
             Self::Zernike { .. }
             | Self::Even { .. }
             | Self::Splines(_)
-            | Self::Spherical { .. }
+            | Self::Spherical(_)
             | Self::SecondPlane(_) => self.trigonometric_degree(),
             Self::Hemispherical(harmonics) => harmonics.len().isqrt() - 1,
         }
@@ -261,8 +256,8 @@ impl Directions {
                 let degree = harmonics.len().isqrt() - 1;
                 Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
             }
-            Self::Spherical { all, .. } => {
-                let degree = all.degree();
+            Self::Spherical(harmonics) => {
+                let degree = harmonics.degree();
                 Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
             }
             Self::Splines(_) | Self::SecondPlane(_) => None,
@@ -275,7 +270,7 @@ impl Directions {
         match self {
             Self::Zernike { .. } => out[0] = PI.sqrt(),
             Self::Hemispherical(_) => out[0] = TAU.sqrt(),
-            Self::Even { .. } | Self::Spherical { .. } => out[0] = (2.0 * TAU).sqrt(),
+            Self::Even { .. } | Self::Spherical(_) => out[0] = (2.0 * TAU).sqrt(),
             Self::SecondPlane(_) => out[0] = 1.0,
             Self::Splines(splines) => splines.unity(out),
         }
@@ -294,9 +289,7 @@ impl Directions {
             Self::Zernike { .. } => (degree / PI).sqrt(),
             // By the addition theorem all of a degree have squares that sum to (2l+1)/4π.
             Self::Hemispherical(_) => ((2.0 * degree + 1.0) / TAU).sqrt(),
-            Self::Even { .. } | Self::Spherical { .. } => {
-                ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt()
-            }
+            Self::Even { .. } | Self::Spherical(_) => ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt(),
             Self::SecondPlane(plane) => plane.largest(k),
             Self::Splines(_) => 1.0,
         }
@@ -309,7 +302,7 @@ impl Directions {
             Self::Zernike { zernike, .. } if k < zernike.len() => format!("Z({n},{m})"),
             Self::Zernike { .. } => format!("cos Z({},0)", n - 1),
             Self::Hemispherical(_) => format!("H({n},{m})"),
-            Self::Even { .. } | Self::Spherical { .. } => format!("Y({n},{m})"),
+            Self::Even { .. } | Self::Spherical(_) => format!("Y({n},{m})"),
             Self::SecondPlane(plane) => plane.name(k),
             Self::Splines(splines) => splines.name(k),
         }

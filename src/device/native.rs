@@ -1,4 +1,5 @@
-//! The task that owns a link's both directions and the protocol's host end.
+//! The task that drives a controller of gonio's own: a link joined to the protocol's host
+//! endpoint, the one place that knows both bytes and messages.
 //!
 //! It lives as long as its handle: then it stops the axes if they may be moving, and ends.
 
@@ -12,8 +13,8 @@ use firmware_protocol::{
 use tokio::io::{AsyncReadExt, AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::sync::{mpsc, watch};
 
-use super::{DeviceEvent, LinkLost, Order, Said};
-use crate::device::Link;
+use super::Link;
+use super::controller::{DeviceEvent, LinkLost, Order, Said};
 
 /// Read at a time, bytes.
 const READ_BYTES: usize = 1024;

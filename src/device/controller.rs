@@ -1,11 +1,9 @@
-//! The driver of gonio's own controllers: a link joined to the protocol's host endpoint, the one
-//! place that knows both bytes and messages.
+//! What a run drives, by one vocabulary: a controller of gonio's own at the end of a link, or
+//! several devices that are composed to one.
 //!
-//! A task of its own owns the link's both directions, so that a wait that is broken off loses
-//! nothing. When its handle goes, however that came, the task stops the axes. It does not know
-//! what commands are for: it hands on what the device says.
-
-mod pump;
+//! A task of its own owns the links' both directions, so that a wait that is broken off loses
+//! nothing. When its handle goes, however that came, the task stops the axes. This does not know
+//! what commands are for, nor which of the two it is: it hands on what is said.
 
 use std::time::Duration;
 
@@ -17,7 +15,9 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 
 use super::Link;
-use pump::Pump;
+use super::composed::{self, Composer};
+use super::driver::{NamedFault, Refusal};
+use super::native::Pump;
 
 /// Why a link says nothing more after it hung up.
 const GONE: &str = "the link is closed";
@@ -30,6 +30,9 @@ const SWEEPS_SINCE: u8 = 1;
 pub enum DeviceEvent {
     /// Something unasked: started, done, sampled, failed. Each comes once.
     Event(Event),
+    /// One of several devices stands still, and has a name for why. The commands that it ends
+    /// follow as failed.
+    Fault(NamedFault),
     /// The link is gone, and with it the session and all open requests.
     LinkLost(LinkLost),
     /// A request was answered.
@@ -61,6 +64,9 @@ pub enum LinkLost {
         /// In the system's words.
         detail: String,
     },
+    /// One of several devices answers no more: which, and to what.
+    #[error("{0}")]
+    Mute(String),
     /// The port is there, but nobody answers on it.
     #[error("{port}: no reply to {request} after {attempts} attempts over {} ms: {cause}", elapsed.as_millis())]
     NoReply {
@@ -112,6 +118,12 @@ pub enum ConnectError {
         /// What happened.
         detail: String,
     },
+    /// One of several devices does not answer: which, and what was heard instead.
+    #[error("{0}")]
+    Mute(String),
+    /// One of several devices is not the one that the rig file describes.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// Nobody answers.
     #[error("{port}: no answer from a device in {} ms; is it powered, and the baud rate {baud}?", waited.as_millis())]
     Silent {
@@ -136,13 +148,19 @@ pub enum ConnectError {
     },
 }
 
-enum Order {
+/// What the handle asks of its task.
+#[derive(Debug)]
+pub(super) enum Order {
     Identify,
     Send(Request),
 }
 
-enum Said {
+/// What the task says to its handle.
+#[derive(Debug)]
+pub(super) enum Said {
     Device(DeviceEvent),
+    /// No session: a device is another one, or there is none.
+    Unfit(ConnectError),
     Version {
         device: (u8, Option<u8>),
         host: (u8, u8),
@@ -151,10 +169,10 @@ enum Said {
     Unheard(LinkCause),
 }
 
-/// A device of our own protocol, connected. Dropping it stops the axes, if they may be moving, and
-/// lets go of the link.
+/// What a run drives, connected. Dropping it stops the axes, if they may be moving, and lets go of
+/// the links.
 #[derive(Debug)]
-pub struct Native {
+pub struct Controller {
     name: String,
     baud: u32,
     orders: mpsc::UnboundedSender<Order>,
@@ -163,8 +181,8 @@ pub struct Native {
     task: JoinHandle<()>,
 }
 
-impl Native {
-    /// Opens a session. `session` is drawn anew by the caller for every connection, or the device
+impl Controller {
+    /// Opens a session with a controller of gonio's own. `session` is drawn anew by the caller for every connection, or the device
     /// takes the new host for the old one. Asks again until `patience` is over; a device of
     /// another protocol version, or a port that hangs up, ends it at once.
     pub async fn connect(
@@ -182,6 +200,24 @@ impl Native {
         let mut native = Self { name, baud, orders, said, statistics: watched, task };
         let identity = native.identify(patience).await?;
         Ok((native, identity))
+    }
+
+    /// Opens a session with several devices, over their links in the order of the composer's
+    /// drivers.
+    pub async fn compose(
+        composer: Composer,
+        links: Vec<Link>,
+    ) -> Result<(Self, Identity), ConnectError> {
+        let names: Vec<&str> = links.iter().map(Link::name).collect();
+        let name = names.join(" and ");
+        let (orders, to_task) = mpsc::unbounded_channel();
+        let (from_task, said) = mpsc::unbounded_channel();
+        let (_, statistics) = watch::channel(LinkStatistics::default());
+        let task = tokio::spawn(composed::pump(composer, links, to_task, from_task));
+        let mut composed = Self { name, baud: 0, orders, said, statistics, task };
+        // Each driver has a patience of its own.
+        let identity = composed.identify(Duration::ZERO).await?;
+        Ok((composed, identity))
     }
 
     /// Opens another session over the same link: what the last one left is stopped and forgotten.
@@ -212,6 +248,7 @@ impl Native {
                     reply: Reply::Identity(identity), ..
                 })) => return Ok(Ok(identity)),
                 Some(Said::Unheard(cause)) => return Ok(Err(cause)),
+                Some(Said::Unfit(error)) => return Err(error),
                 Some(Said::Device(DeviceEvent::LinkLost(LinkLost::HungUp { detail, .. }))) => {
                     return Err(ConnectError::HungUp { port, detail });
                 }
@@ -261,7 +298,7 @@ impl Native {
                 }
                 DeviceEvent::LinkLost(lost) => lost.to_string(),
                 DeviceEvent::Restarted { .. } => "it restarted".to_owned(),
-                DeviceEvent::Event(_) => continue,
+                DeviceEvent::Event(_) | DeviceEvent::Fault(_) => continue,
             };
             return Err(ConnectError::Noisy { port, baud, detail });
         }
@@ -281,7 +318,7 @@ impl Native {
         }
     }
 
-    /// What messages call the link.
+    /// What messages call the links.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -315,15 +352,20 @@ impl Native {
             Some(Said::Device(event)) => return event,
             Some(Said::Version { .. }) => "it now speaks another protocol version".to_owned(),
             Some(Said::Unheard(cause)) => cause.to_string(),
+            Some(Said::Unfit(error)) => error.to_string(),
             None => GONE.to_owned(),
         };
         DeviceEvent::LinkLost(LinkLost::HungUp { port, detail })
     }
 
-    /// Stops the axes if they may be moving, and lets go of the link.
+    /// Stops the axes if they may be moving, and lets go of the links; the task ends when both
+    /// are done.
+    pub fn let_go(self) -> JoinHandle<()> {
+        self.task
+    }
+
+    /// As [`Controller::let_go`], and waits for it.
     pub async fn close(self) {
-        let Self { orders, task, .. } = self;
-        drop(orders);
-        let _ = task.await;
+        let _ = self.let_go().await;
     }
 }

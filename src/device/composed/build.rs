@@ -1,0 +1,111 @@
+//! From the rig file to a composer with its drivers.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use super::Composer;
+use super::meter::MeterPart;
+use super::part::Part;
+use crate::device::axes::Axes;
+use crate::device::grbl::Grbl;
+use crate::device::keithley::Keithley;
+use crate::device::photometer::Photometer;
+use crate::rig::{
+    AxesDriver, AxesLink, Axis, PhotometerDriver, PhotometerLink, Port, Readback, Rig,
+};
+
+/// What messages call the port of a device that is simulated.
+const SIMULATED: &str = "a simulated port";
+
+impl Composer {
+    /// Composes drivers to one: of the axes in the order of the rig file's links, and of the
+    /// meter. `boot_id` is drawn anew for every composer: nobody can tell what its devices did
+    /// before.
+    pub fn new(
+        rig: &Rig,
+        links: &[AxesLink],
+        axes: Vec<Box<dyn Axes>>,
+        photometer: Box<dyn Photometer>,
+        boot_id: u32,
+    ) -> Self {
+        let parts = links.iter().zip(axes).map(|(link, driver)| part(rig, link, driver));
+        Self {
+            parts: parts.collect(),
+            meter: MeterPart {
+                driver: photometer,
+                full_scales: rig.detector.gains.iter().map(|gain| gain.full_scale_a).collect(),
+                adc: rig.detector.adc,
+                facts: None,
+                awaited: None,
+                is_zeroed: false,
+                exposed: None,
+                shutter: None,
+                axes_time_s: None,
+                is_at_fault: false,
+                is_gone: false,
+            },
+            boot_id,
+            homed: 0,
+            here: vec![0; rig.axes.len()],
+            queue: VecDeque::new(),
+            running: None,
+            last_id: None,
+            unacknowledged: BTreeSet::new(),
+            fault: None,
+            opening: None,
+            halting: None,
+            said: VecDeque::new(),
+        }
+    }
+}
+
+impl Composer {
+    /// The drivers of a rig's devices, composed; `None` where a controller of gonio's own drives
+    /// all of it.
+    pub fn of(rig: &Rig, boot_id: u32) -> Option<Self> {
+        let devices = rig.devices.as_ref()?;
+        let axes = devices.axes.iter().map(axes_driver).collect();
+        let photometer = photometer_driver(rig, &devices.photometer);
+        Some(Self::new(rig, &devices.axes, axes, photometer, boot_id))
+    }
+}
+
+fn axes_driver(link: &AxesLink) -> Box<dyn Axes> {
+    match &link.driver {
+        AxesDriver::Grbl { letters, shutter } => {
+            Box::new(Grbl::new(port_name(link.port.as_ref()), letters, *shutter))
+        }
+    }
+}
+
+fn photometer_driver(rig: &Rig, link: &PhotometerLink) -> Box<dyn Photometer> {
+    let port = port_name(link.port.as_ref());
+    let full_scales = rig.detector.gains.iter().map(|gain| gain.full_scale_a).collect();
+    match link.driver {
+        PhotometerDriver::Keithley6485 => {
+            Box::new(Keithley::new(port, link.baud, full_scales, rig.detector.adc.rate_hz))
+        }
+    }
+}
+
+fn port_name(port: Option<&Port>) -> &str {
+    port.map_or(SIMULATED, |port| &port.path)
+}
+
+fn part(rig: &Rig, link: &AxesLink, driver: Box<dyn Axes>) -> Part {
+    let axes: Vec<&Axis> = link
+        .axes
+        .iter()
+        .filter_map(|name| rig.axes.iter().find(|axis| axis.name == *name))
+        .collect();
+    let zeros = axes.iter().zip(&link.zeros).map(|(axis, zero)| axis.counts(*zero));
+    Part {
+        driver,
+        channels: axes.iter().map(|axis| usize::from(axis.channel)).collect(),
+        zeros: zeros.collect(),
+        says_encoder: axes.iter().map(|axis| axis.readback == Readback::Encoder).collect(),
+        facts: None,
+        awaited: None,
+        fault: None,
+        is_gone: false,
+    }
+}

@@ -1,0 +1,151 @@
+//! The task that owns all the ports of a composer. It lives as long as its handle: then it stops
+//! the axes if they may be moving, and ends.
+
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use firmware_protocol::Instant;
+use tokio::io::{AsyncRead as _, AsyncWrite as _, ReadBuf};
+use tokio::sync::mpsc;
+
+use super::Composer;
+use crate::device::Link;
+use crate::device::controller::{LinkLost, Order, Said};
+
+/// Read at a time, bytes.
+const READ_BYTES: usize = 1024;
+/// How long axes may take to come to rest once nobody listens.
+const LAST_STOP: Duration = Duration::from_secs(5);
+
+/// A port, as long as it is there.
+struct Port {
+    name: String,
+    link: Option<Link>,
+    outgoing: Vec<u8>,
+}
+
+enum Heard {
+    Bytes(Vec<u8>),
+    Gone(String),
+}
+
+/// Joins a composer to its ports, in the order of its drivers.
+pub(in crate::device) async fn pump(
+    mut composer: Composer,
+    links: Vec<Link>,
+    mut orders: mpsc::UnboundedReceiver<Order>,
+    said: mpsc::UnboundedSender<Said>,
+) {
+    let origin = tokio::time::Instant::now();
+    let mut ports: Vec<Port> = links.into_iter().map(Port::new).collect();
+    ports.resize_with(composer.ports(), || Port {
+        name: "no port".to_owned(),
+        link: None,
+        outgoing: Vec::new(),
+    });
+    // Once nobody listens: until when to wait for the axes to stand.
+    let mut last_stop: Option<tokio::time::Instant> = None;
+    loop {
+        let now = Instant::ZERO + origin.elapsed();
+        for (n, port) in ports.iter_mut().enumerate() {
+            // One piece at a time: what stops the axes waits for no more than that.
+            if port.outgoing.is_empty()
+                && let Some(bytes) = composer.poll_transmit(now, n)
+            {
+                port.outgoing = bytes;
+            }
+        }
+        composer.listen(now);
+        while let Some(word) = composer.poll_said() {
+            let _ = said.send(word);
+        }
+        let is_quiet = ports.iter().all(|port| port.outgoing.is_empty());
+        if last_stop.is_some() && composer.is_at_rest() && is_quiet {
+            return;
+        }
+        let wake = composer.poll_timeout().map(|at| origin + Duration::from_micros(at.micros()));
+        let wake = [wake, last_stop].into_iter().flatten().min();
+        tokio::select! {
+            biased;
+            order = orders.recv(), if last_stop.is_none() => {
+                let now = Instant::ZERO + origin.elapsed();
+                if let Some(order) = order {
+                    composer.handle_order(now, order);
+                } else {
+                    composer.stop_for_good(now);
+                    last_stop = Some(tokio::time::Instant::now() + LAST_STOP);
+                }
+            }
+            () = tokio::time::sleep_until(wake.unwrap_or(origin)), if wake.is_some() => {
+                if last_stop.is_some_and(|end| end <= tokio::time::Instant::now()) {
+                    return;
+                }
+                composer.handle_timeout(Instant::ZERO + origin.elapsed());
+            }
+            (n, heard) = next(&mut ports) => {
+                let now = Instant::ZERO + origin.elapsed();
+                match heard {
+                    Some(Heard::Bytes(bytes)) => composer.handle_bytes(now, n, &bytes),
+                    Some(Heard::Gone(detail)) => {
+                        let port = ports.get(n).map(|port| port.name.clone()).unwrap_or_default();
+                        composer.port_gone(now, n, LinkLost::HungUp { port, detail });
+                    }
+                    None => {}
+                }
+            }
+        }
+    }
+}
+
+/// What the next port has to say; `None` where one has written what it had.
+async fn next(ports: &mut [Port]) -> (usize, Option<Heard>) {
+    poll_fn(|context| {
+        for (n, port) in ports.iter_mut().enumerate() {
+            if let Poll::Ready(heard) = port.poll(context) {
+                return Poll::Ready((n, heard));
+            }
+        }
+        Poll::Pending
+    })
+    .await
+}
+
+impl Port {
+    fn new(link: Link) -> Self {
+        Self { name: link.name().to_owned(), link: Some(link), outgoing: Vec::new() }
+    }
+
+    fn poll(&mut self, context: &mut Context<'_>) -> Poll<Option<Heard>> {
+        let Some(link) = &mut self.link else {
+            self.outgoing.clear();
+            return Poll::Pending;
+        };
+        if !self.outgoing.is_empty() {
+            match Pin::new(&mut *link).poll_write(context, &self.outgoing) {
+                Poll::Ready(Ok(0)) => return self.gone("nothing can be written"),
+                Poll::Ready(Ok(n)) => {
+                    self.outgoing.drain(..n);
+                    return Poll::Ready(None);
+                }
+                Poll::Ready(Err(error)) => return self.gone(&error.to_string()),
+                Poll::Pending => {}
+            }
+        }
+        let mut bytes = [0; READ_BYTES];
+        let mut buffer = ReadBuf::new(&mut bytes);
+        match Pin::new(link).poll_read(context, &mut buffer) {
+            Poll::Ready(Ok(())) if buffer.filled().is_empty() => self.gone("end of the stream"),
+            Poll::Ready(Ok(())) => Poll::Ready(Some(Heard::Bytes(buffer.filled().to_vec()))),
+            Poll::Ready(Err(error)) => self.gone(&error.to_string()),
+            Poll::Pending => Poll::Pending,
+        }
+    }
+
+    fn gone(&mut self, detail: &str) -> Poll<Option<Heard>> {
+        self.link = None;
+        self.outgoing.clear();
+        Poll::Ready(Some(Heard::Gone(detail.to_owned())))
+    }
+}

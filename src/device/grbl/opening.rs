@@ -1,0 +1,187 @@
+//! Finding out who is there. A board may be booting, locked, or still busy with what an earlier
+//! host asked: it is asked until it answers, brought to rest, and asked what it is.
+
+use std::time::Duration;
+
+use firmware_protocol::{Cause, Instant};
+
+use super::{ANSWER_WITHIN, Grbl, Purpose, Report, State, Stream, Task, byte};
+use crate::device::axes::{AxesEvent, AxesFacts, AxisFacts};
+use crate::device::driver::{NamedFault, Refusal, Trouble};
+
+/// A board that was reset by opening its port answers after two seconds, at most.
+const PATIENCE: Duration = Duration::from_secs(4);
+/// How long `$I` and `$$` may take: forty lines at 9600 baud.
+const TALK: Duration = Duration::from_secs(2);
+/// What a board takes that has said nothing of its buffer yet.
+const FIRST_BUFFER: usize = 64;
+
+/// How far the opening has come.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    until: Instant,
+    stage: Stage,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Stage {
+    /// Somebody answers `?` at all.
+    Greeting,
+    /// What it was doing comes to rest.
+    Calming,
+    /// `$I`, then `$$`.
+    Asking(State),
+    Listing(State),
+}
+
+impl Grbl {
+    /// From the beginning; or over again, after the banner of a board that has just booted.
+    pub(super) fn begin_opening(&mut self, now: Instant, banner: Option<&str>) {
+        self.board = super::Board::default();
+        self.offset = None;
+        self.stream = Stream::new(FIRST_BUFFER);
+        self.tries = 0;
+        let until = match (&self.task, banner) {
+            (Task::Opening(step), Some(_)) => step.until.max(now + TALK),
+            _ => now + PATIENCE,
+        };
+        if let Some(version) = banner.filter(|version| !version.starts_with("1.1")) {
+            let what = format!("it is grbl {version}");
+            return self.refuse((what, "grbl 1.1".to_owned(), "flash grbl 1.1".to_owned()));
+        }
+        self.go(Stage::Greeting, until);
+        self.ask(now);
+    }
+
+    fn go(&mut self, stage: Stage, until: Instant) {
+        self.task = Task::Opening(Step { until, stage });
+    }
+
+    /// A report came.
+    pub(super) fn open_on(&mut self, now: Instant, step: Step, report: &Report) {
+        let Step { until, stage } = step;
+        match (stage, report.state) {
+            (Stage::Greeting, State::Run | State::Home) => {
+                self.urgent.push(byte::HOLD);
+                self.go(Stage::Calming, until);
+                self.ask_at = Some(now + ANSWER_WITHIN);
+            }
+            (Stage::Greeting | Stage::Calming, State::Jog) => {
+                self.urgent.push(byte::JOG_CANCEL);
+                self.go(Stage::Calming, until);
+                self.ask_at = Some(now + ANSWER_WITHIN);
+            }
+            // At rest in a hold: a reset forgets what is queued, and loses no step.
+            (Stage::Greeting | Stage::Calming, State::Hold(0)) => {
+                self.urgent.push(byte::RESET);
+                self.go(Stage::Calming, until);
+                self.ask_at = Some(now + ANSWER_WITHIN);
+            }
+            (Stage::Greeting | Stage::Calming, State::Check) => self.refuse((
+                "it is in check mode, in which nothing moves".to_owned(),
+                "a board that moves".to_owned(),
+                "send $C, or reset the board".to_owned(),
+            )),
+            (
+                Stage::Greeting | Stage::Calming,
+                state @ (State::Idle | State::Alarm | State::Door(_) | State::Sleep),
+            ) => {
+                self.board.axes = match &report.position {
+                    super::Position::Machine(axes) | super::Position::Work(axes) => axes.len(),
+                };
+                // Ends half a line that somebody may have left; its answer is nobody's.
+                self.stream.push("", Purpose::Move);
+                self.stream.push("$I", Purpose::Ask);
+                self.go(Stage::Asking(state), until.max(now + TALK));
+                self.ask_at = Some(now + TALK / 2);
+            }
+            // Still braking; or a report that comes late.
+            (Stage::Greeting | Stage::Calming, _) => self.ask_at = Some(now + ANSWER_WITHIN / 3),
+            (Stage::Asking(_) | Stage::Listing(_), _) => {}
+        }
+    }
+
+    /// `$I` or `$$` was answered to its end.
+    pub(super) fn answered(&mut self, now: Instant) {
+        let Task::Opening(Step { stage, .. }) = &self.task else { return };
+        match *stage {
+            Stage::Asking(state) if self.board.version.is_some() => {
+                if let Err(unfit) = self.board.check_version() {
+                    return self.refuse(unfit);
+                }
+                self.stream.push("$$", Purpose::Ask);
+                self.go(Stage::Listing(state), now + 2 * TALK);
+                self.ask_at = Some(now + TALK);
+            }
+            Stage::Listing(state) => match self.facts(state) {
+                Ok(facts) => {
+                    self.stream = Stream::new(self.board.buffer());
+                    self.rest();
+                    self.say(AxesEvent::Ready(facts));
+                }
+                Err(unfit) => self.refuse(unfit),
+            },
+            // The answer to something older.
+            Stage::Asking(_) | Stage::Greeting | Stage::Calming => {}
+        }
+    }
+
+    /// No answer in time.
+    pub(super) fn open_again(&mut self, now: Instant, step: Step) {
+        let Step { until, stage } = step;
+        if now >= until {
+            let heard = match (self.bytes, self.garbled) {
+                (0, _) => "nothing was heard; is it powered, and is this its port?".to_owned(),
+                (bytes, garbled) if garbled > 0 || self.board.version.is_none() => format!(
+                    "{bytes} bytes were heard, and no line of grbl's among them; another baud \
+                     rate, or another device?"
+                ),
+                (bytes, _) => format!("{bytes} bytes were heard, but not to their end"),
+            };
+            let what = format!("{}: no answer from a grbl: {heard}", self.name);
+            return self.fail(Trouble::Silent(what));
+        }
+        match stage {
+            Stage::Greeting | Stage::Calming => self.ask(now),
+            Stage::Asking(_) | Stage::Listing(_) => {
+                // Its buffer may hold what an earlier host sent: begin again.
+                self.stream.clear();
+                self.go(Stage::Greeting, until);
+                self.ask(now);
+            }
+        }
+    }
+
+    fn facts(&mut self, state: State) -> Result<AxesFacts, super::settings::Unfit> {
+        self.board.check_modes()?;
+        let places = self.board.places(&self.letters)?;
+        let mut scaled = Vec::new();
+        let mut axes: Vec<AxisFacts> = Vec::new();
+        for place in places {
+            scaled.push((place, self.board.steps_per_unit(place)?));
+            axes.push(self.board.facts(place)?);
+        }
+        self.places = scaled;
+        let fault = matches!(state, State::Door(_)).then(|| NamedFault {
+            device: self.name.clone(),
+            name: "the safety door is open".to_owned(),
+            cause: Cause::Stopped,
+            loses_position: false,
+        });
+        let version = self.board.version.as_deref().unwrap_or_default();
+        Ok(AxesFacts {
+            identity: format!("grbl {version}"),
+            axes,
+            // A board that is not locked may have been unlocked without homing: it can't tell.
+            is_homed: false,
+            is_synchronous: true,
+            has_shutter: self.shutter.is_some(),
+            fault,
+        })
+    }
+
+    fn refuse(&mut self, (what, expected, help): super::settings::Unfit) {
+        let device = self.name.clone();
+        self.fail(Trouble::Refused(Refusal { device, what, expected, help }));
+    }
+}

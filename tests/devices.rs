@@ -1,0 +1,117 @@
+//! Rigs that are put together of other makes' devices, simulated: a run, its readings beside those
+//! of gonio's own controller, and what a rig file gets wrong.
+
+mod bench;
+
+use bench::Bench;
+
+const DEVICES: &str = "\
+[[axes_link]]
+driver = \"grbl\"
+letters = { theta = \"X\", phi = \"Y\", x = \"Z\", y = \"A\" }
+zero_deg = { theta = -100, phi = -190 }
+zero_mm = { x = -55, y = -55 }
+shutter = \"flood\"
+
+[photometer]
+driver = \"keithley-6485\"
+baud = 57600
+";
+
+const ONE_LINK: &str = "[link]\nkind = \"simulated\"\nbaud = 1_000_000\n";
+
+/// The small plan on a rig of simulated devices.
+fn on_devices() -> Bench {
+    let link = format!("[link]\nkind = \"simulated\"\n\n{DEVICES}");
+    Bench::small()
+        .with("rig.toml", "readback = \"encoder\"", "readback = \"steps\"")
+        .with("rig.toml", ONE_LINK, &link)
+}
+
+struct Column(Vec<Vec<String>>, Vec<String>);
+
+fn table(bench: &Bench, file: &str) -> Column {
+    let text = bench.text(file);
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect());
+    let heads = lines.next().unwrap();
+    Column(lines.collect(), heads)
+}
+
+impl Column {
+    fn of(&self, name: &str) -> Vec<f64> {
+        let n = self.1.iter().position(|head| head == name).unwrap();
+        self.0.iter().map(|row| row[n].parse().unwrap()).collect()
+    }
+}
+
+#[test]
+fn a_plan_reads_the_same_through_grbl_and_a_picoammeter() {
+    let devices = on_devices();
+    devices.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    let own = Bench::small();
+    own.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    let [a, b] = [&devices, &own].map(|bench| table(bench, "run/samples.csv"));
+    let radiance = "radiance_w_per_m2_sr";
+    let pairs = a.of(radiance).into_iter().zip(b.of(radiance));
+    let u = a
+        .of("u_independent_radiance_w_per_m2_sr")
+        .into_iter()
+        .zip(b.of("u_independent_radiance_w_per_m2_sr"));
+    let mut worst = 0.0_f64;
+    for ((a, b), (ua, ub)) in pairs.zip(u) {
+        worst = worst.max((a - b).abs() / (ua.hypot(ub) + 2e-3 * b.abs()));
+    }
+    assert!(a.0.len() == b.0.len() && a.0.len() > 20);
+    assert!(worst < 5.0, "off by {worst} uncertainties");
+    for column in ["theta_deg", "phi_deg", "x_mm", "y_mm"] {
+        for (a, b) in a.of(column).into_iter().zip(b.of(column)) {
+            assert!((a - b).abs() < 0.02, "{column}: {a} beside {b}");
+        }
+    }
+    // The same again is the same, byte for byte.
+    devices.gonio(&["run", "plan.toml", "--out", "again"]).well();
+    assert_eq!(devices.text("run/samples.csv"), devices.text("again/samples.csv"));
+}
+
+/// At ports, with a simulated twin of the same file.
+fn at_ports() -> Bench {
+    let bench = on_devices();
+    let simulated = bench.text("rig.toml");
+    let real = simulated.split("\n[simulated]").next().unwrap();
+    let port = |name: &str| format!("port = \"{}\"\n", bench.path(name).display());
+    let real = real
+        .replace("kind = \"simulated\"", "kind = \"devices\"")
+        .replace("driver = \"grbl\"\n", &format!("driver = \"grbl\"\n{}", port("board")))
+        .replace(
+            "driver = \"keithley-6485\"\n",
+            &format!("driver = \"keithley-6485\"\n{}", port("board-photometer")),
+        );
+    bench.having("rig.toml", real).with("plan.toml", "scene = \"scene.toml\"\n", "")
+}
+
+#[test]
+fn what_a_rig_file_gets_wrong_about_its_devices_is_named() {
+    let cases: [(&str, &str, &[&str]); 6] = [
+        ("theta = \"X\"", "theta = \"Y\"", &["rig.toml", "letters", "another axis's already"]),
+        (", y = \"A\"", "", &["zero_mm.y: unknown key"]),
+        ("theta = \"X\"", "theta = \"Q\"", &["no letter of an axis"]),
+        ("shutter = \"flood\"", "shuter = \"flood\"", &["did you mean `shutter`"]),
+        ("driver = \"keithley-6485\"", "driver = \"keithley\"", &["keithley-6485"]),
+        ("theta = -100", "theta = -10", &["theta", "travel", "the device allows"]),
+    ];
+    for (from, to, words) in cases {
+        let bench = on_devices().with("rig.toml", from, to);
+        let before = bench.names();
+        bench.gonio(&["run", "plan.toml", "--out", "run"]).refused(words);
+        assert_eq!(bench.names(), before);
+    }
+    let twice = at_ports().with("rig.toml", "board-photometer", "board");
+    twice.gonio(&["run", "plan.toml"]).refused(&["another device's port already"]);
+    let unmoved =
+        on_devices().with("rig.toml", ", y = \"A\"", "").with("rig.toml", ", y = -55", "");
+    unmoved.gonio(&["run", "plan.toml"]).refused(&["no device moves y"]);
+    let bare = Bench::small().with("rig.toml", ONE_LINK, "[link]\nkind = \"devices\"\n");
+    bare.gonio(&["run", "plan.toml"]).refused(&["[[axes_link]]"]);
+    let encoders = on_devices().with("rig.toml", "readback = \"steps\"", "readback = \"encoder\"");
+    encoders.gonio(&["run", "plan.toml"]).refused(&["grbl", "no encoder", "steps"]);
+}
