@@ -239,10 +239,12 @@ fn basis_in_words(basis: BasisSpec) -> String {
 }
 
 fn choice_in_words(choice: &Choice) -> String {
-    let Choice { sweeps, n_sweeps, n_readings, candidates } = choice;
+    let Choice { sweeps, n_sweeps, n_lines, n_readings, candidates } = choice;
     let tried = candidates.len();
+    let lines =
+        n_lines.map(|lines| format!(", {lines} lines at all places each")).unwrap_or_default();
     let text = format!(
-        "leaving out {} ({n_sweeps} of {n_readings} readings), of {tried} tried",
+        "leaving out {} ({n_sweeps} of {n_readings} readings{lines}), of {tried} tried",
         sweeps.name()
     );
     let Some(next) = candidates.get(1) else { return text };

@@ -274,6 +274,7 @@ fn choice(choice: &Choice) -> Value {
     json!({
         "left_out": choice.sweeps.name(),
         "n_sweeps": choice.n_sweeps,
+        "n_lines": choice.n_lines,
         "n_readings": choice.n_readings,
         "candidates": candidates.collect::<Vec<Value>>(),
     })

@@ -13,8 +13,8 @@ use crate::beam::design::Design;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
 use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample};
-use faer::linalg::solvers::SolveCore;
-use faer::{Mat, Side};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Mat, Par, Side};
 
 /// Whitened rows and values of the readings that a choice is made from.
 pub(super) struct Family {
@@ -93,9 +93,8 @@ impl Family {
         let Some(found) = self.left_out(&rows, &solution, &prior, scale, folds) else {
             return Ok(None);
         };
-        let (score, left_out, misfit, residuals) = found;
-        let trial = Trial { penalty, coefficients: basis.len(), score, left_out, misfit };
-        Ok(Some((trial, residuals)))
+        let (trial, residuals) = found;
+        Ok(Some((Trial { penalty, ..trial }, residuals)))
     }
 
     /// The likeliest penalty, and the variance of the readings over their stated one.
@@ -143,8 +142,7 @@ impl Family {
         Ok(best.map(|(power, found)| (Penalty { power, strength: found.strength }, found.scale)))
     }
 
-    /// Mean log density of the readings left out fold by fold, the RMS of their errors, and the
-    /// misfit.
+    /// How well readings left out fold by fold are foretold, and the residuals of all.
     fn left_out(
         &self,
         rows: &Mat<f64>,
@@ -152,7 +150,7 @@ impl Family {
         prior: &Prior,
         scale: f64,
         folds: &[Vec<usize>],
-    ) -> Option<(f64, f64, f64, Vec<f64>)> {
+    ) -> Option<(Trial, Vec<f64>)> {
         let p = rows.ncols();
         let mut triangle = Triangle::new(p, 1);
         let z = whole.rotated(0);
@@ -171,22 +169,14 @@ impl Family {
         let s = solution.inverse_matrix();
         let fitted = rows * &c;
         let spread = rows * &s;
+        let determined_min = if prior.is_none() { DETERMINED_MIN } else { 0.0 };
         let (mut score, mut squares, mut count) = (0.0, 0.0, 0);
         for fold in folds {
             let part = Mat::from_fn(fold.len(), p, |i, j| spread[(fold[i], j)]);
-            let mut kept = &part * part.transpose();
-            for i in 0..fold.len() {
-                for j in 0..fold.len() {
-                    kept[(i, j)] = f64::from(u8::from(i == j)) - kept[(i, j)];
-                }
-            }
-            let kept = kept.llt(Side::Lower).ok()?;
-            let mut covariance = Mat::<f64>::identity(fold.len(), fold.len());
-            kept.solve_in_place_with_conj(faer::Conj::No, covariance.as_mut());
-            for i in 0..fold.len() {
-                let residual = |k: usize| self.values[fold[k]] - fitted[(fold[k], 0)];
-                let error: f64 = (0..fold.len()).map(|k| covariance[(k, i)] * residual(k)).sum();
-                let variance = scale * covariance[(i, i)];
+            let residuals: Vec<f64> =
+                fold.iter().map(|i| self.values[*i] - fitted[(*i, 0)]).collect();
+            for (error, variance) in missed(&part, &residuals, determined_min)? {
+                let variance = scale * variance;
                 let surprise = libm::log(1.0 + error * error / (FREEDOM * variance));
                 score -= 0.5 * (libm::log(variance) + (FREEDOM + 1.0) * surprise);
                 squares += error * error;
@@ -196,9 +186,15 @@ impl Family {
         let count = f64::from(count);
         let is_sound = count > 0.0 && f64::is_finite(score);
         is_sound.then(|| {
-            let misfit = self.misfit(&fitted, spread.squared_norm_l2());
             let residuals = self.values.iter().enumerate().map(|(i, v)| v - fitted[(i, 0)]);
-            (score / count, (squares / count).sqrt(), misfit, residuals.collect())
+            let trial = Trial {
+                penalty: Penalty::NONE,
+                coefficients: p,
+                score: score / count,
+                left_out: (squares / count).sqrt(),
+                misfit: self.misfit(&fitted, spread.squared_norm_l2()),
+            };
+            (trial, residuals.collect())
         })
     }
 
@@ -228,6 +224,30 @@ impl Family {
             (0..places).flat_map(|q| angular.iter().map(move |j| q * width + j)).collect();
         Mat::from_fn(self.rows.nrows(), columns.len(), |i, j| self.rows[(i, columns[j])])
     }
+}
+
+/// The errors by which the readings of a fold would be missed without it, and their variances over a
+/// reading's: (1 - U Uᵀ)⁻¹ r and that matrix's diagonal, `part` being U, A S of the fold. Of more readings
+/// than coefficients through the smaller of the two triangles: (1 - U Uᵀ)⁻¹ = 1 + U (1 - Uᵀ U)⁻¹ Uᵀ (Woodbury 1950).
+/// `None` where without the fold less than `determined_min` is left of what determines a combination.
+fn missed(part: &Mat<f64>, residuals: &[f64], determined_min: f64) -> Option<Vec<(f64, f64)>> {
+    let is_tall = part.nrows() > part.ncols();
+    let gram = if is_tall { part.transpose() * part } else { part * part.transpose() };
+    let size = gram.nrows();
+    let kept = Mat::from_fn(size, size, |i, j| f64::from(u8::from(i == j)) - gram[(i, j)]);
+    let kept = kept.llt(Side::Lower).ok()?;
+    if (0..size).any(|i| kept.L()[(i, i)].powi(2) < determined_min) {
+        return None;
+    }
+    // (1 - G)⁻¹ = WᵀW.
+    let mut w =
+        if is_tall { part.transpose().to_owned() } else { Mat::<f64>::identity(size, size) };
+    solve_lower_triangular_in_place(kept.L(), w.as_mut(), Par::Seq);
+    let r = Mat::from_fn(residuals.len(), 1, |i, _| residuals[i]);
+    let errors = w.transpose() * (&w * &r);
+    let own = if is_tall { 1.0 } else { 0.0 };
+    let of = |i: usize| (errors[(i, 0)] + own * residuals[i], own + w.col(i).squared_norm_l2());
+    Some((0..residuals.len()).map(of).collect())
 }
 
 /// Places of a smaller basis's functions among a larger one's: both are ordered by degree, Zernike
@@ -262,6 +282,8 @@ fn triangle(rows: &Mat<f64>, values: &[f64]) -> Option<Solution> {
 /// gap that a left-out sweep leaves surprises every basis: under a normal density the winner
 /// would be who calls all of the lobe noise.
 const FREEDOM: f64 = 4.0;
+/// Less is left by rounding of what only the readings left out determine, where nothing is held.
+const DETERMINED_MIN: f64 = 1e-10;
 /// Powers of the degree that a penalty is tried with: from middling fields to very smooth ones, and
 /// for fields with edges.
 const SMOOTHER: [f64; 4] = [2.0, 3.0, 5.0, 8.0];

@@ -149,6 +149,9 @@ pub struct Choice {
     pub sweeps: SweepKind,
     /// How many sweeps there are among those readings.
     pub n_sweeps: usize,
+    /// How many lines of directions they run along, where each was left out at all places together;
+    /// `None` where sweeps were left out one by one.
+    pub n_lines: Option<usize>,
     /// Readings that the choice was made from: of many, whole sweeps of them.
     pub n_readings: usize,
     /// All that was tried: the chosen one first, then by falling score.
@@ -190,9 +193,20 @@ pub fn choose(
     one_pose(samples, region)?;
     let sweeps = Sweeps::of(samples, region).thinned(search::readings_max(optics));
     let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
-    let mut search = Search::new(&chosen, region, wish, optics, &sweeps);
-    search.run()?;
-    let Search { mut tried, .. } = search;
+    let found = |one_by_one: bool| -> Result<Vec<(BasisSpec, Trial)>, FitError> {
+        let mut search = Search::new(&chosen, region, wish, optics, &sweeps, one_by_one);
+        search.run()?;
+        Ok(search.tried)
+    };
+    // Where nothing is held, few lines less leave little determined.
+    let is_plain = wish.penalty().is_some_and(|penalty| penalty.is_none());
+    let lines_min = if is_plain { PLAIN_LINES_MIN } else { 0 };
+    let mut n_lines = sweeps.shared_lines().filter(|lines| *lines >= lines_min);
+    let mut tried = found(n_lines.is_none())?;
+    if tried.is_empty() && n_lines.is_some() {
+        n_lines = None;
+        tried = found(true)?;
+    }
     tried.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
     prefer_finer(&mut tried);
     let Some(&(_, best)) = tried.first() else {
@@ -212,6 +226,7 @@ pub fn choose(
     let choice = Choice {
         sweeps: sweeps.kind,
         n_sweeps: sweeps.members.len(),
+        n_lines,
         n_readings: chosen.len(),
         candidates,
     };
@@ -298,6 +313,8 @@ fn truncation(tried: &[(BasisSpec, Trial)]) -> f64 {
     falling.clamp(0.0, chosen.misfit).sqrt()
 }
 
+/// Of fewer lines none is left out where nothing is held against rough fields.
+const PLAIN_LINES_MIN: usize = 4;
 /// A basis with fewer functions by this factor is a coarser one.
 const COARSER: f64 = 1.2;
 /// What a finer basis may cost in log density a reading: a tenth of u.

@@ -36,6 +36,7 @@ impl<'s> Search<'s> {
         wish: &'s Wish,
         optics: Option<&'s Optics>,
         sweeps: &Sweeps,
+        one_by_one: bool,
     ) -> Self {
         let model = Model::of(samples);
         let grid = Grid::of(samples, region);
@@ -50,7 +51,7 @@ impl<'s> Search<'s> {
             optics,
             u: samples.iter().map(|sample| model.u_of(sample)).collect(),
             strengths: wish.strengths(scale_min),
-            folds: sweeps.folds(FOLDS),
+            folds: sweeps.folds(FOLDS, one_by_one),
             position_most: distinct.saturating_sub(1),
             coefficients_max: most.min(samples.len()),
             tried: Vec::new(),

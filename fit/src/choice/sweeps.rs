@@ -6,6 +6,10 @@
 //! readings at one place and one θ (a ring), or of one direction (a scan over the sample). A plan
 //! that has no such lines at all (low discrepancy, lists) is cut into blocks that hang together in
 //! direction and place.
+//!
+//! Where a plan flies the same lines of directions at several places, a line is left out at all of
+//! them together: a sweep left out alone would be given away by its twin at the next place, and
+//! nothing would test what a basis does between the lines.
 
 use crate::grid::Grid;
 use crate::{Ray, Region, Sample};
@@ -41,6 +45,8 @@ pub(crate) struct Sweeps {
     pub(crate) kind: SweepKind,
     /// Indices of the samples of each.
     pub(crate) members: Vec<Vec<usize>>,
+    /// Which line of directions each runs along; those of one line stand together.
+    lines: Vec<i64>,
 }
 
 impl Sweeps {
@@ -57,22 +63,42 @@ impl Sweeps {
             (SweepKind::Place, &|ray| [theta(ray), turn(ray), 0]),
         ];
         for (kind, key) in tries {
-            let members = by_key(&rays, key);
+            let (members, mut lines) = by_key(&rays, key);
+            if kind == SweepKind::Place {
+                // One direction each.
+                lines = numbered(members.len());
+            }
             let long = members.iter().filter(|sweep| sweep.len() >= LENGTH_MIN);
             let held: usize = long.clone().map(Vec::len).sum();
             if long.count() >= SWEEPS_MIN && held as f64 >= HELD_MIN * rays.len() as f64 {
-                return Self { kind, members };
+                return Self { kind, members, lines };
             }
         }
-        Self { kind: SweepKind::Block, members: blocks(samples, region) }
+        let members = blocks(samples, region);
+        let lines = numbered(members.len());
+        Self { kind: SweepKind::Block, members, lines }
     }
 
-    /// At most `most` readings in whole sweeps, evenly out of all of them.
+    /// How many lines of directions there are, where they run at more than one place each.
+    pub(crate) fn shared_lines(&self) -> Option<usize> {
+        let distinct = self.lines.chunk_by(|a, b| a == b).count();
+        (distinct >= LINES_MIN && distinct < self.members.len()).then_some(distinct)
+    }
+
+    /// At most `most` readings in whole sweeps, evenly out of all of them: of each line at other
+    /// places than of the next one.
     pub(crate) fn thinned(mut self, most: usize) -> Self {
         let total: usize = self.members.iter().map(Vec::len).sum();
         if total > most {
             let every = total.div_ceil(most);
-            self.members = self.members.into_iter().step_by(every).collect();
+            let mut runs = Vec::new();
+            for (number, run) in self.lines.chunk_by(|a, b| a == b).enumerate() {
+                runs.extend((0..run.len()).map(|at| (number + at).is_multiple_of(every)));
+            }
+            let mut kept = runs.iter();
+            self.members.retain(|_| kept.next() == Some(&true));
+            let mut kept = runs.iter();
+            self.lines.retain(|_| kept.next() == Some(&true));
         }
         // A single sweep may be longer than all that is asked for.
         let longest = (most / self.members.len().max(1)).max(1);
@@ -83,14 +109,19 @@ impl Sweeps {
         self
     }
 
-    /// The sweeps dealt into `count` folds, neighbouring ones into different folds. Indices count
-    /// the readings in the order of `members`.
-    pub(crate) fn folds(&self, count: usize) -> Vec<Vec<usize>> {
-        let mut folds = vec![Vec::new(); count.min(self.members.len())];
-        let mut at = 0;
-        let dealt = folds.len().max(1);
+    /// The sweeps dealt into `count` folds, neighbouring ones into different folds; where lines are
+    /// shared, and unless sweeps are to be left out one by one, all of a line into one. Indices
+    /// count the readings in the order of `members`.
+    pub(crate) fn folds(&self, count: usize, one_by_one: bool) -> Vec<Vec<usize>> {
+        let shared = self.shared_lines().filter(|_| !one_by_one);
+        let dealt = count.min(shared.unwrap_or(self.members.len())).max(1);
+        let mut folds = vec![Vec::new(); dealt];
+        let (mut at, mut number) = (0, 0);
         for (i, sweep) in self.members.iter().enumerate() {
-            folds[i % dealt].extend(at..at + sweep.len());
+            if i > 0 && (shared.is_none() || self.lines[i] != self.lines[i - 1]) {
+                number += 1;
+            }
+            folds[number % dealt].extend(at..at + sweep.len());
             at += sweep.len();
         }
         folds.retain(|fold| !fold.is_empty());
@@ -107,17 +138,25 @@ fn key(value: f64) -> i64 {
 /// What rays of one sweep share.
 type Keys<'k> = &'k dyn Fn(&Ray) -> [i64; 3];
 
-fn by_key(rays: &[Ray], key: Keys<'_>) -> Vec<Vec<usize>> {
+/// What shares a key, and which line of directions that is: the key's first number of sweeps, which
+/// stand in its order.
+fn by_key(rays: &[Ray], key: Keys<'_>) -> (Vec<Vec<usize>>, Vec<i64>) {
     let mut members = std::collections::BTreeMap::<[i64; 3], Vec<usize>>::new();
     for (i, ray) in rays.iter().enumerate() {
         members.entry(key(ray)).or_default().push(i);
     }
     let along = |ray: &Ray| [self::key(ray.theta_rad), self::key(ray.phi_rad)];
+    let lines = members.keys().map(|key| key[0]).collect();
     let mut members: Vec<Vec<usize>> = members.into_values().collect();
     for sweep in &mut members {
         sweep.sort_by_key(|i| along(&rays[*i]));
     }
-    members
+    (members, lines)
+}
+
+/// Each a line of its own.
+fn numbered(count: usize) -> Vec<i64> {
+    (0_i64..).take(count).collect()
 }
 
 /// Halves the readings across the coordinate that varies most, again and again.
@@ -163,6 +202,8 @@ fn halves(mut block: Vec<usize>, places: &[[f64; 5]]) -> [Vec<usize>; 2] {
 const LENGTH_MIN: usize = 4;
 /// Fewer sweeps than these can't be left out one by one.
 const SWEEPS_MIN: usize = 4;
+/// One of fewer lines than these can't be left out.
+const LINES_MIN: usize = 2;
 /// The share of the readings that has to lie in sweeps.
 const HELD_MIN: f64 = 0.8;
 /// Blocks of a plan without sweeps.
@@ -200,8 +241,38 @@ mod tests {
         let n = samples.len();
         let back = |sweep: &Vec<usize>| sweep.iter().map(|i| n - 1 - i).collect::<Vec<usize>>();
         assert_eq!(sweeps.members, turned.members.iter().map(back).collect::<Vec<_>>());
-        let folds = sweeps.folds(4);
-        assert_eq!(folds.iter().map(Vec::len).sum::<usize>(), n);
+        // Each line at both places together, or one by one.
+        assert_eq!(sweeps.shared_lines(), Some(4));
+        for (folds, lengths) in [
+            (sweeps.folds(16, false), vec![28, 28, 14, 14]),
+            (sweeps.folds(16, true), vec![14, 14, 14, 14, 7, 7, 7, 7]),
+        ] {
+            assert_eq!(folds.iter().map(Vec::len).collect::<Vec<_>>(), lengths);
+            assert_eq!(lengths.iter().sum::<usize>(), n);
+        }
+    }
+
+    #[test]
+    fn of_many_sweeps_every_line_and_every_place_stays() {
+        let mut samples = Vec::new();
+        for x in [-0.009, -0.003, 0.003, 0.009] {
+            for phi in 0..12 {
+                let line = f64::from(phi) * 15.0;
+                samples.extend((1..8).map(|i| sample(x, f64::from(i) * 10.0, line)));
+            }
+        }
+        for part in [2, 3, 4] {
+            let few = Sweeps::of(&samples, &REGION).thinned(samples.len() / part);
+            let of: Vec<Ray> = few.members.iter().map(|sweep| samples[sweep[0]].ray).collect();
+            assert!((48 / part - 2..=48 / part).contains(&of.len()), "{}", of.len());
+            let distinct = |value: &dyn Fn(&Ray) -> f64| {
+                of.iter()
+                    .map(|ray| key(value(ray)))
+                    .collect::<std::collections::BTreeSet<_>>()
+                    .len()
+            };
+            assert_eq!((distinct(&|ray| ray.phi_rad), distinct(&|ray| 1e2 * ray.x_m)), (12, 4));
+        }
     }
 
     #[test]
