@@ -62,6 +62,7 @@ fn as_text(
         ("rig time", prediction.total_s()),
     ];
     rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
+    rows.extend(order(setup));
     rows.extend(decided_on_the_way(setup));
     if let Ok(forecast) = outlook {
         let (count, condition) = (forecast.coefficients, forecast.condition);
@@ -85,6 +86,21 @@ fn as_text(
         }
     }
     text
+}
+
+/// How good the order of the targets is.
+fn order(setup: &Setup) -> Option<Vec<String>> {
+    let way = setup.plan.way(&setup.rig, &setup.sequence)?;
+    Some(row(
+        "order",
+        format!(
+            "{} of moving and settling through the targets; no order takes less than {}: at most {} \
+             above",
+            duration(way.seconds),
+            duration(way.least_s),
+            percent(way.gap()),
+        ),
+    ))
 }
 
 /// What is decided while an adaptive plan runs: all else is said of its first round.
@@ -153,6 +169,9 @@ fn as_json(
             "theta_deg": theta.to_degrees(), "phi_deg": phi.to_degrees(),
             "x_mm": x * 1e3, "y_mm": y * 1e3,
         },
+        "order": setup.plan.way(&setup.rig, &setup.sequence).map(|way| json!({
+            "way_s": way.seconds, "least_s": way.least_s, "gap_relative": way.gap(),
+        })),
         "adaptive": setup.plan.adaptive().map(|adaptive| json!({
             "radiance_relative": adaptive.radiance_relative,
             "exitance_relative": adaptive.exitance_relative,

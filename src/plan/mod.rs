@@ -8,6 +8,7 @@
 mod adaptive;
 #[cfg(test)]
 mod adaptive_tests;
+mod bound;
 mod builder;
 mod cost;
 #[cfg(test)]
@@ -32,10 +33,12 @@ mod sweep;
 #[cfg(test)]
 mod sweep_tests;
 mod terms;
+mod tour;
 mod tree;
 mod wanted;
 
 pub use adaptive::{Adaptive, SWEEPS_MAX};
+pub use bound::Way;
 pub use cost::{Prediction, StepTime, TimeLeft, time_of};
 pub use expect::Expect;
 pub use hash::{PlanHash, fnv1a64};

@@ -2,18 +2,24 @@
 //! out as they are visited.
 //!
 //! The distance of two places is the time of the move between them, the longest of the axes'
-//! times. Since each axis's time grows with its own distance, one axis alone bounds the whole from
+//! times, and then until the axes are still. Since each axis's time grows with its own distance, one axis alone bounds the whole from
 //! below, and a tree that splits one axis at a time finds the true nearest.
 //!
 //! It knows times and places, not targets. Every answer depends on its input alone.
 
-use crate::rig::{AxisPositions, Rig};
+use crate::rig::{Approach, AxisPositions, Rig};
+
+/// Nearer than this, in radians or metres, an axis does not move: less than any rig's count.
+const STILL: f64 = 1e-9;
 
 /// The rig's axes as far as the time of a move goes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MoveTime {
     speed: [f64; 4],
     acceleration: [f64; 4],
+    settle_s: [f64; 4],
+    /// Where targets are reached from, as a sign, and how far beyond them the way there turns.
+    run_up: [Option<(f64, f64)>; 4],
 }
 
 impl MoveTime {
@@ -21,13 +27,57 @@ impl MoveTime {
         Self {
             speed: rig.axes.each_ref().map(|axis| axis.speed),
             acceleration: rig.axes.each_ref().map(|axis| axis.acceleration),
+            settle_s: rig.axes.each_ref().map(|axis| axis.settle.as_secs_f64()),
+            run_up: rig.axes.each_ref().map(|axis| match axis.approach {
+                Approach::Either => None,
+                Approach::Negative => Some((-1.0, axis.run_up)),
+                Approach::Positive => Some((1.0, axis.run_up)),
+            }),
         }
     }
 
-    /// Seconds between two places: symmetric, and no detour is quicker.
+    /// Seconds from one place to another, until the axes are still, but for where they have to come
+    /// from: symmetric, and at most [`Self::directed`].
     pub(super) fn between(&self, a: &AxisPositions, b: &AxisPositions) -> f64 {
         let along = |axis: usize| self.along(axis, a.0[axis] - b.0[axis]);
-        along(0).max(along(1)).max(along(2)).max(along(3))
+        along(0).max(along(1)).max(along(2)).max(along(3)) + self.settling(a, b)
+    }
+
+    /// Seconds from one place to another as they are driven: an axis with play comes from its own
+    /// side, and turns round where its way there has another one.
+    pub(super) fn directed(&self, from: &AxisPositions, to: &AxisPositions) -> f64 {
+        let (mut via, mut has_via) = (*to, false);
+        for axis in 0..4 {
+            let way = to.0[axis] - from.0[axis];
+            if let Some((side, run_up)) = self.run_up[axis]
+                && way.abs() > STILL
+                && way * side < 0.0
+            {
+                via.0[axis] = to.0[axis] - side * run_up;
+                has_via = true;
+            }
+        }
+        if !has_via {
+            return self.between(from, to);
+        }
+        let moving = |a: &AxisPositions, b: &AxisPositions| {
+            let along = |axis: usize| self.along(axis, a.0[axis] - b.0[axis]);
+            along(0).max(along(1)).max(along(2)).max(along(3))
+        };
+        moving(from, &via) + moving(&via, to) + self.settling(from, to)
+    }
+
+    /// Whether some axis has a side of its own.
+    pub(super) fn is_one_sided(&self) -> bool {
+        self.run_up.iter().any(Option::is_some)
+    }
+
+    /// Of the axes that move the one that takes longest.
+    fn settling(&self, a: &AxisPositions, b: &AxisPositions) -> f64 {
+        let of = |axis: usize| {
+            if (a.0[axis] - b.0[axis]).abs() > STILL { self.settle_s[axis] } else { 0.0 }
+        };
+        of(0).max(of(1)).max(of(2)).max(of(3))
     }
 
     fn along(&self, axis: usize, distance: f64) -> f64 {
@@ -193,7 +243,12 @@ mod tests {
     use super::*;
 
     fn time() -> MoveTime {
-        MoveTime { speed: [1.0, 1.0, 0.1, 0.1], acceleration: [2.0, 2.0, 0.5, 0.5] }
+        MoveTime {
+            speed: [1.0, 1.0, 0.1, 0.1],
+            acceleration: [2.0, 2.0, 0.5, 0.5],
+            settle_s: [0.05, 0.02, 0.3, 0.0],
+            run_up: [None, Some((1.0, 0.1)), None, None],
+        }
     }
 
     fn places() -> impl Strategy<Value = Vec<AxisPositions>> {
@@ -226,6 +281,17 @@ mod tests {
                 tree.take(found);
             }
             prop_assert!(left.is_empty());
+        }
+
+        #[test]
+        fn a_way_that_has_to_turn_round_takes_no_less(points in places()) {
+            let here = AxisPositions([0.1; 4]);
+            for point in &points {
+                let (there, back) = (time().directed(&here, point), time().directed(point, &here));
+                let least = time().between(&here, point);
+                prop_assert!(there >= least && back >= least);
+                prop_assert!(there.to_bits() == least.to_bits() || back.to_bits() == least.to_bits());
+            }
         }
 
         #[test]
