@@ -2,7 +2,7 @@
 //! run` has, to values at the nodes, by a fit or by splines through the readings; and their score.
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Instant;
 
@@ -19,6 +19,7 @@ use crate::plan::Plan;
 use crate::rig::calibration::{Calibrated, calibrate};
 use crate::rig::{Pose, Reading, Rig};
 use crate::run::OnFault;
+use crate::study::Motion;
 use crate::study::cost::{Run, Rung, Scene, SceneFiles, Strategy, interpolate};
 use crate::study::{Nodes, Score};
 
@@ -138,10 +139,17 @@ impl<'a> Bench<'a> {
         let Acquired { journal, .. } = acquired;
         let journal = journal.map_err(Failure::midway)?;
         let readings = journal.reader().readings(Order::Taken)?;
-        let setup = setup.with_rounds(journal.reader())?;
+        let mut setup = setup.with_rounds(journal.reader())?;
         journal.close().map_err(Failure::midway)?;
         // Thousands of journals would fill a disk.
         let _ = std::fs::remove_dir_all(&folder);
+        if strategy.motion() == Motion::Adaptive {
+            // Its time may have broken a round off: what it would have measured costs nothing.
+            let taken: BTreeSet<u32> = readings.iter().map(|reading| reading.id).collect();
+            let steps = setup.sequence.steps.iter().filter(|step| taken.contains(&step.id));
+            let steps = steps.copied().collect();
+            setup.sequence = setup.sequence.with_steps(&setup.rig, steps);
+        }
         if readings.len() != setup.sequence.steps.len() {
             let (scene, seed) = (self.scene.name(), setup.seed);
             return Err(Failure::midway(format!("{scene}, seed {seed}: the run is not complete")));
