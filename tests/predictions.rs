@@ -155,7 +155,7 @@ fn a_frontier_says_what_can_not_be_swept() {
     let bench = expecting();
     let frontier =
         |more: &[&str]| bench.gonio(&[&["frontier", "plan.toml", "--out", "f"], more].concat());
-    frontier(&["--strategy", "crawl"]).refused(&["crawl", "stop-and-go or sweep"]);
+    frontier(&["--strategy", "crawl"]).refused(&["crawl", "stop-and-go, sweep, adaptive"]);
     frontier(&["--density", "0"]).refused(&["--density", "a factor from 0.01 to 100"]);
     // Windows of two readings come faster than the wire takes them.
     frontier(&["--strategy", "sweep", "--dwell", "0.05"]).refused(&["windows", "the wire carries"]);

@@ -12,10 +12,8 @@ mod cases;
 mod counted;
 mod dice;
 mod document;
-pub mod integral;
 pub mod kernel;
 mod machine;
-pub mod picture;
 mod program;
 pub mod scatter;
 mod statistics;
@@ -27,34 +25,12 @@ pub use cases::{cases, cases_of};
 pub use counted::{Bytes, Counted};
 pub use dice::Dice;
 pub use document::Section;
+pub use gonio::study::arithmetic::Unmeasured;
 pub use machine::{Machine, file_system_of};
 pub use program::{Program, Run, copy_example, edit};
 pub use statistics::{binomial_band, rms};
 pub use stopwatch::{Spread, call_ns, call_ns_in, repeat, repeat_together, timed};
 pub use table::Table;
-
-/// Why something could not be measured; the program then exits with 1.
-#[derive(Debug)]
-pub struct Unmeasured(String);
-
-impl Unmeasured {
-    /// In one sentence.
-    pub fn because(why: impl Into<String>) -> Self {
-        Self(why.into())
-    }
-}
-
-impl std::fmt::Display for Unmeasured {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl<E: std::error::Error> From<E> for Unmeasured {
-    fn from(error: E) -> Self {
-        Self(error.to_string())
-    }
-}
 
 /// Runs a measurement, hands its section out, and makes the exit code: 0 if every aim was met or
 /// there was none, 1 if one was missed or nothing could be measured.
@@ -73,7 +49,7 @@ pub fn report(
             eprintln!("{misses} aims missed");
             std::process::ExitCode::FAILURE
         }
-        Err(Unmeasured(why)) => {
+        Err(why) => {
             eprintln!("not measured: {why}");
             std::process::ExitCode::FAILURE
         }

@@ -85,26 +85,10 @@ pub fn call_ns<T>(act: impl FnMut() -> T) -> f64 {
 
 /// The same from another number of batches.
 pub fn call_ns_in<T>(batches: usize, mut act: impl FnMut() -> T) -> f64 {
-    const BATCH_S: f64 = 1e-4;
-    let mut batch = |calls: u32| {
-        let began = processor_s();
-        for _ in 0..calls {
-            act();
-        }
-        processor_s() - began
+    let mut act = || {
+        act();
     };
-    let mut calls = 1;
-    while batch(calls) < BATCH_S && calls < 1 << 24 {
-        calls *= 2;
-    }
-    let seconds = Spread::of((0..batches.max(1)).map(|_| batch(calls)).collect());
-    1e9 * seconds.median() / f64::from(calls)
-}
-
-/// What this thread has had of a processor.
-fn processor_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+    1e9 * gonio::cli::stopwatch::call_s(batches, &mut act)
 }
 
 #[cfg(test)]
@@ -115,13 +99,5 @@ mod tests {
     fn a_spread_states_its_median_and_its_ends() {
         assert_eq!(Spread::of(vec![3.0, 1.0, 2.0]).to_string(), "2.00 (1.00 to 3.00)");
         assert_eq!(format!("{:.1}", Spread::of(vec![4.0, 1.0])), "2.5 (1.0 to 4.0)");
-    }
-
-    #[test]
-    fn twice_the_work_takes_about_twice_the_time() {
-        let roots =
-            |n: u32| move || (0..std::hint::black_box(n)).map(|i| f64::from(i).sqrt()).sum::<f64>();
-        let (one, two) = (call_ns(roots(10_000)), call_ns(roots(20_000)));
-        assert!((1.5..2.7).contains(&(two / one)), "{one} ns, {two} ns");
     }
 }

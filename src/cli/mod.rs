@@ -37,6 +37,7 @@ mod setup;
 mod shop;
 mod simulated;
 mod stopping;
+pub mod stopwatch;
 mod stream;
 mod study;
 mod summary;

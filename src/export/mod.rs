@@ -9,6 +9,7 @@
 mod accuracy;
 mod atomic;
 mod charted;
+mod compute;
 mod cost;
 mod coverage;
 mod derived;
@@ -32,6 +33,7 @@ mod treatment;
 pub use accuracy::{AccuracyPoint, write_accuracy};
 pub use atomic::{ExportError, cause, write_atomically};
 pub use charted::{Charted, charted};
+pub use compute::write_compute;
 pub use cost::{write_cost, write_reached};
 pub use coverage::write_coverage;
 pub use derived::{DerivedKind, DerivedOutcome, DerivedQuantity, DerivedTable};

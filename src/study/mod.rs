@@ -3,6 +3,7 @@
 //! handed what runs found; it does not know clocks or files.
 
 pub mod adaptive;
+pub mod arithmetic;
 pub mod cost;
 pub mod coverage;
 mod demand;

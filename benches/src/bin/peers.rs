@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use benches::picture::{Curve, Panel, error_against_time};
 use benches::{Arguments, Section, Spread, Table, Unmeasured, report};
 use clap::Parser;
+use gonio::report::{Curve, Panel, error_against_time};
 
 /// Tables and a picture of what `benches/peers/run.sh` measured.
 #[derive(Debug, Parser)]

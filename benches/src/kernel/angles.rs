@@ -4,7 +4,7 @@ use radiometry::basis::{harmonics, legendre, zernike};
 use radiometry::direction;
 use radiometry::interface::{Incidence, Interface, Window};
 
-use super::row::Row;
+use super::Row;
 use super::{Call, Kind, value};
 use crate::Unmeasured;
 

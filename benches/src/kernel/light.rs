@@ -5,7 +5,7 @@ use radiometry::convex::{self, ConvexBody};
 use radiometry::quantity::{ProjectedArea, Throughput};
 use radiometry::throughput;
 
-use super::row::Row;
+use super::Row;
 use super::{Call, Kind, value};
 use crate::Unmeasured;
 

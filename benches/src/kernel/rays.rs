@@ -2,7 +2,7 @@
 
 use radiometry::ray::Ray;
 
-use super::row::Row;
+use super::Row;
 use super::{Call, Kind, value};
 use crate::Unmeasured;
 

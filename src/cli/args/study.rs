@@ -14,7 +14,15 @@ const FACTORS: (f64, f64) = (0.01, 100.0);
 pub(crate) struct FrontierArgs {
     /// The plan whose schedule and dwell are scaled, and whose readings are taken at rest and in
     /// flight.
-    pub(crate) plan: PathBuf,
+    #[arg(required_unless_present = "compute")]
+    pub(crate) plan: Option<PathBuf>,
+    /// What accuracy costs in arithmetic, too (or alone, without a plan): error against processor time
+    /// of kernels and of the methods that integrate, in compute.csv, compute.svg and compute.html.
+    #[arg(long)]
+    pub(crate) compute: bool,
+    /// Peers' answers to draw beside them: a file that benches/peers/run.sh wrote.
+    #[arg(long, value_name = "CSV", requires = "compute")]
+    pub(crate) peers: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
     #[command(flatten)]

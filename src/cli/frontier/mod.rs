@@ -1,5 +1,6 @@
 //! `gonio frontier`: what accuracy costs in time. Runs a plan at several densities and dwells, at
-//! rest and in flight, on the simulated rig, with several seeds, and scores every run against the truth.
+//! rest and in flight, on the simulated rig, with several seeds, and scores every run against the truth;
+//! and times arithmetic likewise.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -16,55 +17,91 @@ use super::results::Results;
 use super::run::first_job;
 use super::session::utc_stamp;
 use super::setup::Setup;
+use super::text::{duration, percent};
 use crate::export::{ExportError, write_atomically, write_frontier};
 use crate::journal::Order;
 use crate::report::frontier_pictures;
 use crate::run::OnFault;
 use crate::study::{Foretold, FrontierPoint, FrontierRow, points};
 
+mod compute;
 mod rungs;
 mod words;
 
-/// Runs every rung of every strategy, writes frontier.csv, its pictures and its page, and prints the
-/// table.
+/// Runs every rung of every strategy, and times the kernels where that is asked; writes tables, pictures
+/// and pages, and prints the tables.
 pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
-    let setup = Setup::from_disk(&args.plan, &args.rig, &args.effects)?;
-    if setup.stage.is_none() {
-        return Err(Failure::with_help(
-            format!("{}: errors are known on a simulated rig alone", setup.rig.name),
-            "choose one with --rig, and what it looks at with --scene",
-        ));
-    }
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| format!("frontier-{}-{}", setup.plan_name, utc_stamp()).into());
+    let peers = args.peers.as_deref().map(compute::peers).transpose()?.unwrap_or_default();
+    // What a rung can't do is found before anything is made.
+    let asked = args.plan.as_deref().map(|plan| asked(args, plan)).transpose()?;
+    let name = asked.as_ref().map_or("compute", |(setup, _)| &setup.plan_name);
+    let folder =
+        args.out.clone().unwrap_or_else(|| format!("frontier-{name}-{}", utc_stamp()).into());
     if folder.exists() {
         return Err(Failure::with_help(
             format!("{}: exists already; nothing is overwritten", folder.display()),
             "choose another folder with --out",
         ));
     }
-    // What a rung can't do is found before anything is made.
-    let entries = entries(&setup, args)?;
-    std::fs::create_dir_all(folder.join("runs"))
+    std::fs::create_dir_all(&folder)
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
-    let rows = run_all(&entries, &folder, args.seeds)?;
-    let points = points(&rows);
-    write(&setup, &folder, &rows, &points).map_err(Failure::midway)?;
-    if args.json {
-        write_out(|out| rows.iter().try_for_each(|row| writeln!(out, "{}", words::as_json(row))))?;
-    } else {
-        say(&format!("{}  folder {}\n", words::as_text(&rows, &points), folder.display()))?;
+    if let Some((setup, entries)) = &asked {
+        in_rig_time(args, setup, entries, &folder)?;
+    }
+    if args.compute {
+        compute::compute(&folder, args.seeds, peers, args.json)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
+fn asked(args: &FrontierArgs, plan: &Path) -> Result<(Setup, Vec<Entry>), Failure> {
+    let setup = Setup::from_disk(plan, &args.rig, &args.effects)?;
+    if setup.stage.is_none() {
+        return Err(Failure::with_help(
+            format!("{}: errors are known on a simulated rig alone", setup.rig.name),
+            "choose one with --rig, and what it looks at with --scene",
+        ));
+    }
+    let entries = entries(&setup, args)?;
+    Ok((setup, entries))
+}
+
+fn in_rig_time(
+    args: &FrontierArgs,
+    setup: &Setup,
+    entries: &[Entry],
+    folder: &Path,
+) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder.join("runs"))
+        .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
+    let rows = run_all(entries, folder, args.seeds)?;
+    let points = points(&rows);
+    let orders = orders(entries);
+    write(setup, &orders, folder, (&rows, &points)).map_err(Failure::midway)?;
+    if args.json {
+        write_out(|out| rows.iter().try_for_each(|row| writeln!(out, "{}", words::as_json(row))))
+    } else {
+        let text = words::as_text(&rows, &points, &orders);
+        say(&format!("{text}  folder {}\n", folder.display()))
+    }
+}
+
+/// Of every rung at rest how good its order is; sweeps have none to speak of.
+fn orders(entries: &[Entry]) -> Vec<String> {
+    let said = |entry: &Entry| {
+        let way = entry.setup.plan.way(&entry.setup.rig, &entry.setup.sequence)?;
+        let (motion, rung) = (entry.motion.name(), entry.parameters());
+        let (gap, least) = (percent(way.gap()), duration(way.least_s));
+        Some(format!("{motion}, {rung}: the way is at most {gap} above the least of {least}"))
+    };
+    entries.iter().filter_map(said).collect()
+}
+
 fn write(
     setup: &Setup,
+    orders: &[String],
     folder: &Path,
-    rows: &[FrontierRow],
-    points: &[FrontierPoint],
+    (rows, points): (&[FrontierRow], &[FrontierPoint]),
 ) -> Result<(), ExportError> {
     let title = format!("{}: what accuracy costs in time", setup.plan_name);
     write_atomically(&folder.join("frontier.csv"), |out| write_frontier(out, rows))?;
@@ -74,7 +111,7 @@ fn write(
         let path = folder.join(format!("{}.svg", picture.name));
         write_atomically(&path, |out| out.write_all(svg.as_bytes()))?;
     }
-    let page = words::page(setup, &title, rows, points, pictures);
+    let page = words::page(setup, &title, (rows, points), pictures, orders.to_vec());
     write_atomically(&folder.join("frontier.html"), |out| page.write(out))
 }
 

@@ -22,12 +22,12 @@ const HEADS: [&str; 9] = [
 ];
 
 /// For a terminal.
-pub(super) fn as_text(rows: &[FrontierRow], points: &[FrontierPoint]) -> String {
+pub(super) fn as_text(rows: &[FrontierRow], points: &[FrontierPoint], orders: &[String]) -> String {
     let mut lines = vec![HEADS.map(str::to_owned).to_vec()];
     lines.extend(points.iter().map(cells));
     let mut text = table(&lines);
     text.push('\n');
-    for words in doublings(points) {
+    for words in doublings(points).iter().chain(orders) {
         // Writing to a string does not fail.
         let _ = writeln!(text, "  {words}");
     }
@@ -74,9 +74,9 @@ fn honesty(rows: &[FrontierRow]) -> String {
 pub(super) fn page(
     setup: &Setup,
     title: &str,
-    rows: &[FrontierRow],
-    points: &[FrontierPoint],
+    (rows, points): (&[FrontierRow], &[FrontierPoint]),
     pictures: Vec<Picture>,
+    orders: Vec<String>,
 ) -> Report {
     let fact = |name: &str, text: String| (name.to_owned(), text);
     let seeds = rows.iter().map(|row| row.seed);
@@ -111,6 +111,16 @@ pub(super) fn page(
             Section {
                 title: "What twice the time buys".to_owned(),
                 items: doublings(points),
+                ..Section::default()
+            },
+            Section {
+                title: "Order of the targets".to_owned(),
+                paragraphs: vec![
+                    "Moving and settling from target to target and back, against a bound below \
+                     every order (Held and Karp's)."
+                        .to_owned(),
+                ],
+                items: orders,
                 ..Section::default()
             },
         ],

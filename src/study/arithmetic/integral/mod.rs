@@ -8,8 +8,8 @@ mod surface;
 use glam::DVec3;
 use serde_json::Value;
 
-use crate::Unmeasured;
-use crate::kernel::Row;
+use super::kernel::Row;
+use crate::study::arithmetic::Unmeasured;
 pub use method::Method;
 use surface::Surface;
 
@@ -51,6 +51,25 @@ impl Problem {
                     |z_m: f64, radius_m: f64| Surface::disk(z_m * DVec3::Z, DVec3::Z, radius_m);
                 Ok(Self::Pair([disk(0.0, r1)?, disk(h, r2)?]))
             }
+            "form-factor-parallel-disks" => {
+                let [r1, r2, h, offset] = row.numbers(["r1", "r2", "h", "offset"])?;
+                let far = DVec3::new(offset, 0.0, h);
+                let first = Surface::disk(DVec3::ZERO, DVec3::Z, r1)?;
+                Ok(Self::Pair([first, Surface::disk(far, DVec3::Z, r2)?]))
+            }
+            "form-factor-spheres" => {
+                let [r1, r2, d] = row.numbers(["r1", "r2", "d"])?;
+                Ok(Self::Pair([Surface::ball(DVec3::ZERO, r1), Surface::ball(d * DVec3::Z, r2)]))
+            }
+            "form-factor-wedge-rectangles" => {
+                let [a, b, l, cos] = row.numbers(["a", "b", "l", "cos_phi"])?;
+                let sin = libm::sqrt((1.0 - cos) * (1.0 + cos));
+                let along = l * DVec3::Y;
+                let flat =
+                    |across: DVec3| Surface::polygon(&[DVec3::ZERO, across, across + along, along]);
+                let up = b * DVec3::new(cos, 0.0, sin);
+                Ok(Self::Pair([flat(a * DVec3::X)?, flat(up)?]))
+            }
             "form-factor-polygons" => {
                 let flat = |key| Surface::polygon(row.polygon(key)?.vertices());
                 Ok(Self::Pair([flat("from")?, flat("to")?]))
@@ -82,7 +101,7 @@ impl Problem {
         let (to, far) = second.at([s, t], chart);
         let between = to - from;
         let square = between.length_squared();
-        let cosines = between.dot(first.normal()).abs() * between.dot(second.normal()).abs();
+        let cosines = first.facing(from, between) * second.facing(to, -between);
         let area = first.area();
         near * far * cosines / (square * square * std::f64::consts::PI * area)
     }
@@ -129,7 +148,7 @@ impl Receiving {
         let facing = match &self.source {
             // Its element is one of solid angle already.
             Surface::Cone { .. } => return element * towards / square.sqrt(),
-            source => between.dot(source.normal()).abs(),
+            source => source.facing(to, between),
         };
         element * towards * facing / (square * square)
     }

@@ -6,7 +6,7 @@ use radiometry::quantity::FormFactor;
 
 use super::row::Row;
 use super::{Call, Kind, estimated, value};
-use crate::Unmeasured;
+use crate::study::arithmetic::Unmeasured;
 
 pub(super) fn call(quantity: &str, row: Row<'_>) -> Result<Option<Call>, Unmeasured> {
     Ok(Some(match quantity {
@@ -77,20 +77,22 @@ fn rectangles(quantity: &str, row: Row<'_>) -> Result<Option<Call>, Unmeasured> 
 fn integrals(quantity: &str, row: Row<'_>) -> Result<Option<Call>, Unmeasured> {
     Ok(Some(match quantity {
         "form-factor-parallel-disks" => {
-            let sizes = row.numbers(["r1", "r2", "h", "offset"])?;
-            Call::new(Kind::Integral, sizes, |[r1, r2, h, offset]| {
-                estimated(form_factor::parallel_disks(*r1, *r2, *h, *offset, Tolerance::default()))
+            let inputs = (row.numbers(["r1", "r2", "h", "offset"])?, row.tolerance()?);
+            Call::new(Kind::Integral, inputs, |([r1, r2, h, offset], tolerance)| {
+                estimated(form_factor::parallel_disks(*r1, *r2, *h, *offset, *tolerance))
             })
         }
         "form-factor-spheres" => {
-            Call::new(Kind::Integral, row.numbers(["r1", "r2", "d"])?, |[r1, r2, d]| {
-                estimated(form_factor::spheres(*r1, *r2, *d, Tolerance::default()))
+            let inputs = (row.numbers(["r1", "r2", "d"])?, row.tolerance()?);
+            Call::new(Kind::Integral, inputs, |([r1, r2, d], tolerance)| {
+                estimated(form_factor::spheres(*r1, *r2, *d, *tolerance))
             })
         }
         "form-factor-wedge-rectangles" => {
             let sizes = row.numbers(["a", "b", "l", "cos_phi"])?;
-            Call::new(Kind::Integral, sizes, |[a, b, l, cos_phi]| {
-                estimated(form_factor::wedge_rectangles(*a, *b, *l, *cos_phi, Tolerance::FINE))
+            let inputs = (sizes, row.tolerance_or(Tolerance::FINE)?);
+            Call::new(Kind::Integral, inputs, |([a, b, l, cos_phi], tolerance)| {
+                estimated(form_factor::wedge_rectangles(*a, *b, *l, *cos_phi, *tolerance))
             })
         }
         "form-factor-polygons" => {

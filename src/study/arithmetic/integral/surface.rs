@@ -7,7 +7,7 @@ use glam::DVec3;
 use radiometry::direction;
 
 use super::Chart;
-use crate::Unmeasured;
+use crate::study::arithmetic::Unmeasured;
 
 /// A surface that the unit square is laid onto.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +18,8 @@ pub enum Surface {
     Triangle([DVec3; 4]),
     /// Two axes across and the unit normal.
     Disk { center_m: DVec3, frame: [DVec3; 3], radius_m: f64 },
+    /// The whole of a ball's surface, whose light goes outwards.
+    Ball { center_m: DVec3, radius_m: f64 },
     /// The directions from a point to a ball: axes across, its axis, and 1 - cos of its half angle.
     Cone { apex_m: DVec3, frame: [DVec3; 3], versine: f64 },
 }
@@ -36,6 +38,10 @@ impl Surface {
         let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
         let versine = sine * sine / (1.0 + cosine);
         Ok(Self::Cone { apex_m, frame: frame(center_m - apex_m)?, versine })
+    }
+
+    pub(super) fn ball(center_m: DVec3, radius_m: f64) -> Self {
+        Self::Ball { center_m, radius_m }
     }
 
     /// Triangles and parallelograms alone.
@@ -57,11 +63,15 @@ impl Surface {
         }
     }
 
-    /// The unit normal; of a cone its axis.
-    pub(super) fn normal(&self) -> DVec3 {
+    /// How much a way from one of its points has along the normal there, metres: on either side of
+    /// what is flat, off a ball outwards alone.
+    pub(super) fn facing(&self, at: DVec3, way: DVec3) -> f64 {
         match self {
-            Self::Parallelogram([.., normal]) | Self::Triangle([.., normal]) => *normal,
-            Self::Disk { frame, .. } | Self::Cone { frame, .. } => frame[2],
+            Self::Parallelogram([.., normal]) | Self::Triangle([.., normal]) => {
+                way.dot(*normal).abs()
+            }
+            Self::Disk { frame, .. } | Self::Cone { frame, .. } => way.dot(frame[2]).abs(),
+            Self::Ball { center_m, radius_m } => (way.dot(at - center_m) / radius_m).max(0.0),
         }
     }
 
@@ -71,6 +81,7 @@ impl Surface {
             Self::Parallelogram([_, first, second, _]) => first.cross(*second).length(),
             Self::Triangle([_, first, second, _]) => 0.5 * first.cross(*second).length(),
             Self::Disk { radius_m, .. } => PI * radius_m * radius_m,
+            Self::Ball { radius_m, .. } => 4.0 * PI * radius_m * radius_m,
             Self::Cone { versine, .. } => 2.0 * PI * versine,
         }
     }
@@ -91,6 +102,14 @@ impl Surface {
                 let (sin, cos) = libm::sincos(2.0 * PI * v);
                 let across = cos * frame[0] + sin * frame[1];
                 (*center_m + part * radius_m * across, share * self.area())
+            }
+            Self::Ball { center_m, radius_m } => {
+                // Even in the height (Archimedes), whatever the chart.
+                let height = 2.0 * u - 1.0;
+                let (sin, cos) = libm::sincos(2.0 * PI * v);
+                let across = ((1.0 - height) * (1.0 + height)).sqrt();
+                let way = DVec3::new(across * cos, across * sin, height);
+                (*center_m + *radius_m * way, self.area())
             }
             Self::Cone { apex_m, frame, versine } => {
                 // 1 - cos of the angle to the axis, in proportion to the part's square.

@@ -5,26 +5,30 @@ use radiometry::Tolerance;
 use radiometry::shape::Polygon;
 use serde_json::Value;
 
-use crate::Unmeasured;
+use crate::study::arithmetic::Unmeasured;
 
 /// Named values.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Row<'a>(&'a Value);
+pub struct Row<'a>(&'a Value);
 
 impl<'a> Row<'a> {
-    pub(crate) fn new(inputs: &'a Value) -> Self {
+    /// Of a case's inputs.
+    pub fn new(inputs: &'a Value) -> Self {
         Self(inputs)
     }
 
-    pub(crate) fn has(self, key: &str) -> bool {
+    /// Whether there is one of this name.
+    pub fn has(self, key: &str) -> bool {
         self.0.get(key).is_some()
     }
 
-    pub(crate) fn number(self, key: &str) -> Result<f64, Unmeasured> {
+    /// A number.
+    pub fn number(self, key: &str) -> Result<f64, Unmeasured> {
         self.0[key].as_f64().ok_or_else(|| lacks(key, "number"))
     }
 
-    pub(crate) fn numbers<const N: usize>(self, keys: [&str; N]) -> Result<[f64; N], Unmeasured> {
+    /// Several numbers.
+    pub fn numbers<const N: usize>(self, keys: [&str; N]) -> Result<[f64; N], Unmeasured> {
         let mut numbers = [0.0; N];
         for (number, key) in numbers.iter_mut().zip(keys) {
             *number = self.number(key)?;
@@ -32,29 +36,34 @@ impl<'a> Row<'a> {
         Ok(numbers)
     }
 
-    pub(crate) fn count(self, key: &str) -> Result<usize, Unmeasured> {
+    /// A whole number.
+    pub fn count(self, key: &str) -> Result<usize, Unmeasured> {
         let number = self.number(key)?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a degree
         Ok(number as usize)
     }
 
-    pub(crate) fn vector(self, key: &str) -> Result<DVec3, Unmeasured> {
+    /// A vector.
+    pub fn vector(self, key: &str) -> Result<DVec3, Unmeasured> {
         vector(&self.0[key]).ok_or_else(|| lacks(key, "vector"))
     }
 
-    pub(crate) fn point_2d(self, key: &str) -> Result<DVec2, Unmeasured> {
+    /// A point in a plane.
+    pub fn point_2d(self, key: &str) -> Result<DVec2, Unmeasured> {
         let list = &self.0[key];
         let read = || Some(DVec2::new(list[0].as_f64()?, list[1].as_f64()?));
         read().ok_or_else(|| lacks(key, "point"))
     }
 
-    pub(crate) fn polygon(self, key: &str) -> Result<Polygon, Unmeasured> {
+    /// A polygon.
+    pub fn polygon(self, key: &str) -> Result<Polygon, Unmeasured> {
         let list = self.0[key].as_array().ok_or_else(|| lacks(key, "list"))?;
         let vertices: Option<Vec<DVec3>> = list.iter().map(vector).collect();
         Ok(Polygon::new(vertices.ok_or_else(|| lacks(key, "list of vectors"))?)?)
     }
 
-    pub(crate) fn triangles(self, key: &str) -> Result<Vec<[DVec3; 3]>, Unmeasured> {
+    /// Triangles.
+    pub fn triangles(self, key: &str) -> Result<Vec<[DVec3; 3]>, Unmeasured> {
         let list = self.0[key].as_array().ok_or_else(|| lacks(key, "list"))?;
         let corner = |triangle: &Value, k: usize| vector(&triangle[k]);
         let triangle = |t: &Value| Some([corner(t, 0)?, corner(t, 1)?, corner(t, 2)?]);
@@ -62,20 +71,28 @@ impl<'a> Row<'a> {
         triangles.ok_or_else(|| lacks(key, "list of triangles"))
     }
 
-    pub(crate) fn object(self, key: &str) -> Self {
+    /// Values within a value.
+    #[must_use]
+    pub fn object(self, key: &str) -> Self {
         Self(&self.0[key])
     }
 
-    pub(crate) fn text(self, key: &str) -> &'a str {
+    /// A text; empty where there is none.
+    pub fn text(self, key: &str) -> &'a str {
         self.0[key].as_str().unwrap_or_default()
     }
 
     /// As the case asks for it; the library's default where it doesn't.
-    pub(crate) fn tolerance(self) -> Result<Tolerance, Unmeasured> {
+    pub fn tolerance(self) -> Result<Tolerance, Unmeasured> {
+        self.tolerance_or(Tolerance::default())
+    }
+
+    /// As the case asks for it; another one where it doesn't.
+    pub fn tolerance_or(self, usual: Tolerance) -> Result<Tolerance, Unmeasured> {
         if self.has("relative_tolerance") {
             Ok(Tolerance::from_relative(self.number("relative_tolerance")?)?)
         } else {
-            Ok(Tolerance::default())
+            Ok(usual)
         }
     }
 }

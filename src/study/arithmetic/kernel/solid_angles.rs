@@ -8,7 +8,7 @@ use radiometry::solid_angle;
 
 use super::row::Row;
 use super::{Call, Kind, estimated, value};
-use crate::Unmeasured;
+use crate::study::arithmetic::Unmeasured;
 
 pub(super) fn call(quantity: &str, row: Row<'_>) -> Result<Option<Call>, Unmeasured> {
     Ok(Some(match quantity {

@@ -9,7 +9,8 @@ use radiometry::quadrature::{Cell, Sum, cubature, quasi_monte_carlo};
 use radiometry::{EstimateError, Tolerance};
 
 use super::{Chart, Problem};
-use crate::{Dice, Unmeasured};
+use crate::study::arithmetic::Unmeasured;
+use crate::study::coverage::Draws;
 
 /// A way to integrate, with what it is allowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,15 +73,15 @@ impl Method {
                 value(estimate)
             }
             Self::MonteCarlo(points) => {
-                let mut dice = Dice::new(seed);
+                let mut draws = Draws::new(seed);
                 let mut sum = Sum::default();
                 let is_point = problem.dimensions() == 2;
                 for _ in 0..points {
-                    let (u, v) = (dice.part(), dice.part());
+                    let (u, v) = (draws.uniform(), draws.uniform());
                     sum.add(if is_point {
                         problem.at_2([u, v], Chart::Even)
                     } else {
-                        problem.at_4([u, v, dice.part(), dice.part()], Chart::Even)
+                        problem.at_4([u, v, draws.uniform(), draws.uniform()], Chart::Even)
                     });
                 }
                 Ok(sum.value() / points as f64)
@@ -128,7 +129,7 @@ mod tests {
 
     /// Unit squares face to face; a unit square above a point; half of a disk behind another.
     fn cases() -> Vec<(Problem, f64)> {
-        let cases = crate::cases().unwrap();
+        let cases = crate::study::arithmetic::cases().unwrap();
         let problem = |id: &str| {
             let case = cases.iter().find(|case| case["id"] == json!(id)).unwrap();
             let exact: f64 = case["expected"].as_str().unwrap().parse().unwrap();
@@ -141,6 +142,9 @@ mod tests {
             "pen029",
             "ff_par_rect01-polygons",
             "ff_polygons01-polygons",
+            "ff_disk_disk_offset01",
+            "ff_sphere_sphere01",
+            "ff_wedge01",
         ]
         .map(problem)
         .into()
@@ -148,12 +152,17 @@ mod tests {
 
     #[test]
     fn every_method_finds_what_the_reference_says() {
-        for (problem, exact) in cases() {
+        for (place, (problem, exact)) in cases().into_iter().enumerate() {
+            let meets = place == 8;
             for (method, within) in [
                 (Method::Adaptive { tolerance: 1e-3, budget: 1_000_000 }, 1e-2),
                 (Method::QuasiMonteCarlo(1 << 13), 2e-2),
                 (Method::MonteCarlo(1 << 16), 5e-2),
             ] {
+                // Without a bound where surfaces meet: points at random rarely see the most of it.
+                if meets && method.is_random() {
+                    continue;
+                }
                 let found = method.integrate(&problem, 1).unwrap();
                 assert!((found / exact - 1.0).abs() < within, "{method:?}: {found}, not {exact}");
             }
