@@ -18,6 +18,7 @@ use super::Link;
 use super::composed::{self, Composer};
 use super::driver::{NamedFault, Refusal};
 use super::native::Pump;
+use crate::rig::DeviceTimes;
 
 /// Why a link says nothing more after it hung up.
 const GONE: &str = "the link is closed";
@@ -28,6 +29,8 @@ const SWEEPS_SINCE: u8 = 1;
 /// What a device has to say, or what became of the link to it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DeviceEvent {
+    /// What the clocks of several devices read at the dwell of this command, whose result follows.
+    Clocks(CommandId, DeviceTimes),
     /// Something unasked: started, done, sampled, failed. Each comes once.
     Event(Event),
     /// One of several devices stands still, and has a name for why. The commands that it ends
@@ -298,7 +301,7 @@ impl Controller {
                 }
                 DeviceEvent::LinkLost(lost) => lost.to_string(),
                 DeviceEvent::Restarted { .. } => "it restarted".to_owned(),
-                DeviceEvent::Event(_) | DeviceEvent::Fault(_) => continue,
+                DeviceEvent::Clocks(..) | DeviceEvent::Event(_) | DeviceEvent::Fault(_) => continue,
             };
             return Err(ConnectError::Noisy { port, baud, detail });
         }

@@ -4,24 +4,25 @@ use std::io::{self, Write};
 
 use super::RayColumns;
 use super::number::number;
-use crate::rig::{AXES, Latched, Reading, ReadingKind, Rig, forward};
+use crate::rig::{AXES, DeviceTimes, Latched, Reading, ReadingKind, Rig, forward};
 
 /// Writes readings.csv, in the order handed in: counts, gain, commanded and latched positions in
-/// counts, the poses that they mean, and the device's clock.
+/// counts, the poses that they mean, and the device's clock; where several devices are the rig,
+/// what their own clocks read, empty for one without.
 pub fn write_readings(
     out: impl Write,
     rig: &Rig,
     readings: impl IntoIterator<Item = Reading>,
 ) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(columns())?;
+    csv.write_record(columns(rig))?;
     for reading in readings {
         csv.write_record(fields(rig, &reading))?;
     }
     csv.flush()
 }
 
-fn columns() -> Vec<String> {
+fn columns(rig: &Rig) -> Vec<String> {
     let mut columns: Vec<String> = [
         "reading",
         "kind",
@@ -45,6 +46,9 @@ fn columns() -> Vec<String> {
         columns.extend(AXES.map(|axis| format!("{place}_{}_counts", axis.name())));
     }
     columns.extend(["start_us", "end_us", "link_retries", "unsettled"].map(str::to_owned));
+    if rig.devices.is_some() {
+        columns.extend(["axes_time_s", "photometer_time_s"].map(str::to_owned));
+    }
     columns
 }
 
@@ -86,5 +90,9 @@ fn fields(rig: &Rig, reading: &Reading) -> Vec<String> {
         reading.link_retries.to_string(),
         u8::from(reading.unsettled).to_string(),
     ]);
+    if rig.devices.is_some() {
+        let DeviceTimes { axes_s, photometer_s } = reading.device_times;
+        fields.extend([axes_s, photometer_s].map(|time| time.map_or(String::new(), number)));
+    }
     fields
 }

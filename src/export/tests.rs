@@ -252,6 +252,7 @@ fn reading(id: u32, kind: ReadingKind) -> Reading {
         end_us: 550_000,
         time_s: 0.5,
         session: 0,
+        device_times: crate::rig::DeviceTimes::default(),
         link_retries: 3,
         unsettled: true,
     }

@@ -8,7 +8,7 @@ use rusqlite::{Connection, Transaction, TransactionBehavior, params};
 use super::lock::AppendLock;
 use super::{Header, Input, JournalError, Reader, Record, read, schema, steps};
 use crate::plan::Step;
-use crate::rig::{Latched, Reading, ReadingKind};
+use crate::rig::{DeviceTimes, Latched, Reading, ReadingKind};
 
 /// The largest input file that a journal takes, bytes.
 const INPUT_BYTES_MAX: usize = 64 << 20;
@@ -144,6 +144,12 @@ fn insert<'a>(connection: &Connection, record: &'a Record) -> rusqlite::Result<I
                 connection
                     .prepare_cached("INSERT INTO swept_readings VALUES (?1, ?2, ?3, ?4, ?5)")?
                     .execute(params![reading.id, theta, phi, x, y])?;
+            }
+            if reading.device_times != DeviceTimes::default() {
+                let DeviceTimes { axes_s, photometer_s } = reading.device_times;
+                connection
+                    .prepare_cached("INSERT INTO device_times VALUES (?1, ?2, ?3)")?
+                    .execute(params![reading.id, axes_s, photometer_s])?;
             }
         }
         Record::Event(event) => {

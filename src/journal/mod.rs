@@ -16,6 +16,8 @@
 mod append;
 mod error;
 mod lock;
+#[cfg(test)]
+mod old_tests;
 mod queue;
 mod read;
 mod record;

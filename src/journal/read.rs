@@ -10,15 +10,15 @@ use super::{
     Session, Verdict, schema, steps,
 };
 use crate::plan::Step;
-use crate::rig::{Latched, Reading, ReadingKind};
+use crate::rig::{DeviceTimes, Latched, Reading, ReadingKind};
 
 const READING: &str = "
 SELECT position, id, kind, target_index, target_repeat, gain, n, mean, variance, min, max, saturated,
     commanded_theta, commanded_phi, commanded_x, commanded_y, start_theta, start_phi, start_x,
     start_y, end_theta, end_phi, end_x, end_y, start_us, end_us, time_s, session, link_retries,
     unsettled, coalesce(travel_theta, 0), coalesce(travel_phi, 0), coalesce(travel_x, 0),
-    coalesce(travel_y, 0)
-FROM readings LEFT JOIN swept_readings USING (id) ";
+    coalesce(travel_y, 0), axes_s, photometer_s
+FROM readings LEFT JOIN swept_readings USING (id) LEFT JOIN device_times USING (id) ";
 
 /// In which order readings come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -261,6 +261,7 @@ fn reading_from_row(row: &Row<'_>) -> rusqlite::Result<Reading> {
         link_retries: row.get(28)?,
         unsettled: row.get(29)?,
         travel: latched_from_row(row, 30)?,
+        device_times: DeviceTimes { axes_s: row.get(34)?, photometer_s: row.get(35)? },
     })
 }
 

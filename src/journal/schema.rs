@@ -12,13 +12,16 @@ use rusqlite::{Connection, OpenFlags};
 use super::JournalError;
 
 /// Raised whenever a table changes.
-pub(super) const VERSION: i64 = 3;
+pub(super) const VERSION: i64 = 4;
 
 /// Version 1 had no sweeps; but for their tables it is the same.
 const WITHOUT_SWEEPS: i64 = 1;
 
 /// Version 2 had no rounds; but for their table it is the same.
 const WITHOUT_ROUNDS: i64 = 2;
+
+/// Version 3 had no rigs of several devices; but for their times it is the same.
+const WITHOUT_DEVICE_TIMES: i64 = 3;
 
 /// "GoNi": what `file` and SQLite call the application id.
 pub(super) const APPLICATION_ID: i64 = 0x476f_4e69;
@@ -155,6 +158,15 @@ CREATE {temporary} TABLE rounds (
 ) STRICT;
 ";
 
+/// What readings have more that several devices took together.
+const DEVICE_TIMES: &str = "
+CREATE {temporary} TABLE device_times (
+    id INTEGER PRIMARY KEY,
+    axes_s REAL,
+    photometer_s REAL
+) STRICT;
+";
+
 /// Before the first transaction.
 pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "page_size", PAGE_BYTES.cast_signed())
@@ -163,7 +175,7 @@ pub(super) fn set_page_size(connection: &Connection) -> rusqlite::Result<()> {
 /// Creates the tables in an open transaction, and marks the file as a journal.
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch(TABLES)?;
-    for tables in [SWEEPS, ROUNDS] {
+    for tables in [SWEEPS, ROUNDS, DEVICE_TIMES] {
         connection.execute_batch(&tables.replace("{temporary}", ""))?;
     }
     connection.pragma_update(None, "application_id", APPLICATION_ID)?;
@@ -237,8 +249,9 @@ pub(super) fn check(path: &Path, connection: &Connection) -> Result<(), JournalE
     let found = pragma("user_version").map_err(fail)?;
     let missing: &[&str] = match found {
         VERSION => &[],
-        WITHOUT_ROUNDS => &[ROUNDS],
-        WITHOUT_SWEEPS => &[SWEEPS, ROUNDS],
+        WITHOUT_DEVICE_TIMES => &[DEVICE_TIMES],
+        WITHOUT_ROUNDS => &[ROUNDS, DEVICE_TIMES],
+        WITHOUT_SWEEPS => &[SWEEPS, ROUNDS, DEVICE_TIMES],
         _ => {
             let path = path.to_owned();
             return Err(JournalError::Schema { path, found, expected: VERSION });

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::plan::{Step, Swept};
-use crate::rig::{AxisPositions, Latched, Pose, Reading, ReadingKind};
+use crate::rig::{AxisPositions, DeviceTimes, Latched, Pose, Reading, ReadingKind};
 
 pub(super) struct Folder(tempfile::TempDir);
 
@@ -56,7 +56,7 @@ fn inputs() -> Vec<Input> {
     ]
 }
 
-fn steps() -> Vec<Step> {
+pub(super) fn steps() -> Vec<Step> {
     let dark = Step {
         id: 0,
         kind: ReadingKind::Dark,
@@ -111,6 +111,10 @@ pub(super) fn reading(id: u32) -> Reading {
         end_us: i64::from(id) * 100_000 + 50_000,
         time_s: f64::from(id) * 0.1,
         session: 0,
+        device_times: DeviceTimes {
+            axes_s: None,
+            photometer_s: (id % 2 == 1).then_some(f64::from(id) * 0.1),
+        },
         link_retries: 0,
         unsettled: false,
     }
@@ -305,40 +309,6 @@ fn what_is_not_a_journal_is_named() {
 }
 
 #[test]
-fn a_journal_from_before_there_were_sweeps_is_read_and_carried_on() {
-    let folder = Folder::new();
-    let mut journal = folder.journal();
-    let at_rest = |id| Reading { travel: Latched([0; 4]), ..reading(id) };
-    journal.append(&[Record::Reading(at_rest(0))]).unwrap();
-    let old = "DROP TABLE swept_steps; DROP TABLE swept_readings; DROP TABLE rounds; \
-               PRAGMA user_version = 1;";
-    journal.reader().connection().execute_batch(old).unwrap();
-    journal.close().unwrap();
-    let readings = |reader: &Reader| reader.readings(Order::Id).unwrap();
-    assert_eq!(readings(&Reader::open(&folder.path()).unwrap()), [at_rest(0)]);
-    let mut journal = Journal::open(&folder.path()).unwrap();
-    assert!(journal.reader().steps().unwrap().iter().all(|step| step.swept.is_none()));
-    journal.append(&[Record::Reading(at_rest(1))]).unwrap();
-    assert_eq!(readings(journal.reader()), [at_rest(0), at_rest(1)]);
-}
-
-#[test]
-fn a_journal_from_before_there_were_rounds_is_read_and_carried_on() {
-    let folder = Folder::new();
-    let mut journal = folder.journal();
-    journal.append(&records(0..1)).unwrap();
-    let old = "DROP TABLE rounds; PRAGMA user_version = 2;";
-    journal.reader().connection().execute_batch(old).unwrap();
-    journal.close().unwrap();
-    assert_eq!(Reader::open(&folder.path()).unwrap().rounds().unwrap(), []);
-    let mut journal = Journal::open(&folder.path()).unwrap();
-    journal.append(&records(1..2)).unwrap();
-    let reader = journal.reader();
-    assert_eq!(reader.readings(Order::Id).unwrap(), [reading(0), reading(1)]);
-    assert_eq!(reader.steps().unwrap(), steps());
-}
-
-#[test]
 fn a_round_and_its_steps_are_kept_together_or_not_at_all() {
     let folder = Folder::new();
     let mut journal = folder.journal();
@@ -367,7 +337,7 @@ fn another_schema_is_refused() {
     let journal = folder.journal();
     journal.reader().connection().pragma_update(None, "user_version", 99).unwrap();
     drop(journal);
-    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 3 };
+    let error = JournalError::Schema { path: folder.path(), found: 99, expected: 4 };
     assert_eq!(Journal::open(&folder.path()).unwrap_err(), error);
     assert_eq!(Reader::open(&folder.path()).unwrap_err(), error);
 }

@@ -28,7 +28,7 @@ pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
 pub use motion::{Flight, comes_to_rest, set_out};
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
-pub use reading::{Latched, Reading, ReadingKind};
+pub use reading::{DeviceTimes, Latched, Reading, ReadingKind};
 
 use spanned_toml::Document;
 

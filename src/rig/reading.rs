@@ -34,6 +34,16 @@ impl Latched {
     }
 }
 
+/// What the clocks of a rig's several devices read at a reading, seconds of their own; `None`
+/// where a device has none, or one controller drives all.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DeviceTimes {
+    /// Of what moves the axes, when it last said where they are.
+    pub axes_s: Option<f64>,
+    /// Of the meter, at its first reading.
+    pub photometer_s: Option<f64>,
+}
+
 /// One dwell, or one window of a sweep, as the device reported it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
@@ -74,6 +84,8 @@ pub struct Reading {
     pub time_s: f64,
     /// Which session of the run took it: 0, and one more after every resume.
     pub session: u32,
+    /// What the devices' own clocks read.
+    pub device_times: DeviceTimes,
     /// Frames of its command that had to be sent again.
     pub link_retries: u32,
     /// The setpoint was not reached within the settle tolerance when the integration began.

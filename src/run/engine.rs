@@ -25,7 +25,7 @@ use super::state::{Fault, Outcome, Position, State};
 use crate::device::{DeviceEvent, LinkLost};
 use crate::journal::{self, EventKind, JournalError, Record, Writer};
 use crate::plan::{RESUME_IDS_FROM, WARM_UP_IDS_FROM};
-use crate::rig::Reading;
+use crate::rig::{DeviceTimes, Reading};
 
 /// How often progress is told while the axes move or the detector integrates.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -54,6 +54,8 @@ pub(super) struct Engine<'a> {
     course: Course,
     // Frames sent again, for commands that needed it.
     retries: BTreeMap<CommandId, u32>,
+    // What devices' clocks read, until the result that follows.
+    clocks: Option<(CommandId, DeviceTimes)>,
     origin: tokio::time::Instant,
     boot_id: Option<u32>,
     outcome: Option<Outcome>,
@@ -94,6 +96,7 @@ impl<'a> Engine<'a> {
             clock: RunClock::default(),
             course,
             retries: BTreeMap::new(),
+            clocks: None,
             origin: tokio::time::Instant::now(),
             boot_id: None,
             outcome: None,
@@ -282,6 +285,10 @@ impl<'a> Engine<'a> {
                 Input::Fault(Fault::LinkLost(lost.to_string()))
             }
             DeviceEvent::Restarted { .. } => Input::Fault(Fault::Restarted),
+            DeviceEvent::Clocks(id, times) => {
+                self.clocks = Some((id, times));
+                return;
+            }
             DeviceEvent::Fault(fault) => Input::Fault(Fault::Named(fault)),
             DeviceEvent::Reply { request, reply, retries } => match reply {
                 Reply::Accepted(id) => {
@@ -384,6 +391,12 @@ impl<'a> Engine<'a> {
             session_began_s: self.session_began_s,
             start_us,
             end_us,
+            device_times: self
+                .clocks
+                .take()
+                .filter(|(of, _)| *of == id)
+                .map(|(_, times)| times)
+                .unwrap_or_default(),
             link_retries: self.retries.remove(&id).unwrap_or_default(),
         };
         self.retries.retain(|command, _| *command > id);

@@ -18,7 +18,7 @@ use super::reading::{Taking, reading};
 use super::state::{Doubt, Fault, Position, State};
 use crate::device::{Controller, DeviceEvent, NamedFault};
 use crate::plan::Step;
-use crate::rig::{Latched, LimitError, Reading, ReadingKind};
+use crate::rig::{DeviceTimes, Latched, LimitError, Reading, ReadingKind};
 
 /// Why the rig did not do what it was told by hand.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -167,6 +167,7 @@ impl Hand<'_> {
             session_began_s: 0.0,
             start_us: 0,
             end_us: i64::from(result.end_tick.micros_since(result.start_tick)),
+            device_times: DeviceTimes::default(),
             link_retries: 0,
         };
         reading(&self.hardware.rig, &step, result, taking)
@@ -213,7 +214,10 @@ impl Hand<'_> {
                     DeviceEvent::Restarted { .. } => {
                         return Err(HandError::Link(Fault::Restarted.to_string()));
                     }
-                    DeviceEvent::Reply { .. } | DeviceEvent::Event(_) | DeviceEvent::Fault(_) => {}
+                    DeviceEvent::Clocks(..)
+                    | DeviceEvent::Reply { .. }
+                    | DeviceEvent::Event(_)
+                    | DeviceEvent::Fault(_) => {}
                 }
             }
         }
@@ -278,7 +282,7 @@ impl Hand<'_> {
                     return Err(HandError::Link(Fault::Restarted.to_string()));
                 }
                 DeviceEvent::Fault(fault) => return Err(HandError::Fault(fault)),
-                DeviceEvent::Event(_) | DeviceEvent::Reply { .. } => {}
+                DeviceEvent::Clocks(..) | DeviceEvent::Event(_) | DeviceEvent::Reply { .. } => {}
             }
         }
     }

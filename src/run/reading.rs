@@ -5,7 +5,7 @@ use firmware_protocol::DwellResult;
 
 use super::channels::to_axes;
 use crate::plan::Step;
-use crate::rig::{Latched, Readback, Reading, Rig};
+use crate::rig::{DeviceTimes, Latched, Readback, Reading, Rig};
 
 /// An axis is off its setpoint when it reads further from it than this many standard
 /// uncertainties of one position ...
@@ -23,12 +23,14 @@ pub(super) struct Taking {
     /// Start and end of the integration since the session began, microseconds.
     pub(super) start_us: i64,
     pub(super) end_us: i64,
+    /// What the devices' own clocks read.
+    pub(super) device_times: DeviceTimes,
     /// Frames of the command that were sent again.
     pub(super) link_retries: u32,
 }
 
 pub(super) fn reading(rig: &Rig, step: &Step, result: &DwellResult, taking: Taking) -> Reading {
-    let Taking { session, session_began_s, start_us, end_us, link_retries } = taking;
+    let Taking { session, session_began_s, start_us, end_us, device_times, link_retries } = taking;
     let start = to_axes(rig, &result.start);
     Reading {
         id: step.id,
@@ -48,6 +50,7 @@ pub(super) fn reading(rig: &Rig, step: &Step, result: &DwellResult, taking: Taki
         end_us,
         time_s: session_began_s + start_us as f64 * 1e-6,
         session,
+        device_times,
         link_retries,
         unsettled: is_off(rig, step.counts, start),
     }

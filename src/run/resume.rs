@@ -298,6 +298,7 @@ mod tests {
             end_us: i64::from(id % 1000) * 1_000_000 + 100_000,
             time_s: f64::from(session) * 1e4 + f64::from(id % 1000),
             session,
+            device_times: crate::rig::DeviceTimes::default(),
             link_retries: 0,
             unsettled: false,
         }

@@ -203,6 +203,7 @@ fn reading(rig: &Rig, prior: &Prior, step: &Step) -> Reading {
         end_us: i64::try_from(step.dwell.as_micros()).unwrap_or(i64::MAX),
         time_s: f64::from(step.id),
         session: 0,
+        device_times: crate::rig::DeviceTimes::default(),
         link_retries: 0,
         unsettled: false,
     }

@@ -5,6 +5,7 @@ use super::words::Words;
 use crate::cli::results::{Results, targets_planned};
 use crate::cli::setup::Setup;
 use crate::cli::text::{duration, percent};
+use crate::device::Composer;
 use crate::journal::InputRole;
 use crate::report::significant;
 use crate::rig::calibration::{Fitted, Flag, Part};
@@ -50,6 +51,16 @@ pub(super) fn facts(
         let scene = setup.inputs.iter().find(|input| input.role == InputRole::Scene);
         let scene = scene.map_or_else(|| "none".to_owned(), |scene| scene.name.clone());
         facts.push(("Scene", format!("{scene}, seed {}", header.seed)));
+    }
+    if let Some(composer) = Composer::of(&setup.rig, 0) {
+        let devices = composer.promises().into_iter().map(|(name, promises)| {
+            let watchdog = promises.watchdog.map_or_else(
+                || "no device watchdog".to_owned(),
+                |after| format!("stops by itself after {} ms", after.as_millis()),
+            );
+            format!("{name}: {watchdog}; done means {}", promises.done)
+        });
+        facts.push(("Devices", devices.collect::<Vec<_>>().join(". ")));
     }
     if let Ok(fitted) = &results.fitted {
         facts.push(("Fit", fit(fitted, &words)));

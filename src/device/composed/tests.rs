@@ -88,15 +88,15 @@ impl Photometer for Puppet {
 }
 
 /// Two boards, of two axes each, and a meter.
-struct Stage {
+struct Play {
     composer: Composer,
     arm: Puppet,
-    stage: Puppet,
+    table: Puppet,
     meter: Puppet,
     now: Instant,
 }
 
-impl Stage {
+impl Play {
     fn new() -> Self {
         let rig = Rig::built_in().unwrap();
         let link = |axes: &[crate::rig::AxisName], zero: f64| AxesLink {
@@ -109,47 +109,47 @@ impl Stage {
         // A degree, and a millimetre: 1000 steps each.
         let links = [link(&AXES[..2], 1.0_f64.to_radians()), link(&AXES[2..], -1e-3)];
         let puppets = [Puppet::default(), Puppet::default(), Puppet::default()];
-        let [arm, stage, meter] = puppets.clone();
-        let axes: Vec<Box<dyn Axes>> = vec![Box::new(arm.clone()), Box::new(stage.clone())];
+        let [arm, table, meter] = puppets.clone();
+        let axes: Vec<Box<dyn Axes>> = vec![Box::new(arm.clone()), Box::new(table.clone())];
         let mut rig = rig;
         rig.axes.iter_mut().for_each(|axis| axis.readback = Readback::Steps);
         let composer = Composer::new(&rig, &links, axes, Box::new(meter.clone()), 7);
-        Self { composer, arm, stage, meter, now: Instant::ZERO }
+        Self { composer, arm, table, meter, now: Instant::ZERO }
     }
 
     fn ready() -> Self {
-        let mut stage = Self::new();
-        stage.order(Order::Identify);
-        for board in [&stage.arm, &stage.stage] {
+        let mut play = Self::new();
+        play.order(Order::Identify);
+        for board in [&play.arm, &play.table] {
             assert_eq!(board.told(), ["open"]);
             board.0.lock().unwrap().axes.push_back(AxesEvent::Ready(facts()));
         }
         let facts = PhotometerFacts { identity: "puppet".into() };
-        stage.meter.0.lock().unwrap().meter.push_back(PhotometerEvent::Ready(facts));
-        assert_eq!(stage.meter.told(), ["open"]);
-        let said = stage.hear();
+        play.meter.0.lock().unwrap().meter.push_back(PhotometerEvent::Ready(facts));
+        assert_eq!(play.meter.told(), ["open"]);
+        let said = play.hear();
         let [DeviceEvent::Reply { reply: Reply::Identity(identity), .. }] = &said[..] else {
             panic!("{said:?}")
         };
         assert_eq!((identity.boot_id, identity.axes.len()), (7, 4));
         assert_eq!((identity.axes[0].low, identity.axes[2].low), (-51_000, -49_000));
-        stage
+        play
     }
 
     /// With a home.
     fn homed() -> Self {
-        let mut stage = Self::ready();
+        let mut play = Self::ready();
         let home = Home { id: CommandId(1), axes: AxisMask(0b1111) };
-        stage.request(Request::Home(home));
-        assert_eq!(stage.arm.told(), ["Home"]);
-        assert_eq!(stage.stage.told(), [""; 0]);
-        stage.arm_says(AxesEvent::Done(at([-500, 0])));
-        assert_eq!(stage.stage.told(), ["Home"]);
-        let said = stage.stage_says(AxesEvent::Done(at([0, 0])));
+        play.request(Request::Home(home));
+        assert_eq!(play.arm.told(), ["Home"]);
+        assert_eq!(play.table.told(), [""; 0]);
+        play.arm_says(AxesEvent::Done(at([-500, 0])));
+        assert_eq!(play.table.told(), ["Home"]);
+        let said = play.table_says(AxesEvent::Done(at([0, 0])));
         let Some(DeviceEvent::Event(Event::Done(done))) = said.last() else { panic!("{said:?}") };
         // Steps less the zeros: a degree, and minus a millimetre.
         assert_eq!(done.readback.0[..], [-1500, -1000, 1000, 1000]);
-        stage
+        play
     }
 
     fn order(&mut self, order: Order) -> Vec<DeviceEvent> {
@@ -171,13 +171,19 @@ impl Stage {
         .collect()
     }
 
+    /// What the axes were told until now.
+    fn forget(&self) {
+        self.arm.told();
+        self.table.told();
+    }
+
     fn arm_says(&mut self, event: AxesEvent) -> Vec<DeviceEvent> {
         self.arm.0.lock().unwrap().axes.push_back(event);
         self.hear()
     }
 
-    fn stage_says(&mut self, event: AxesEvent) -> Vec<DeviceEvent> {
-        self.stage.0.lock().unwrap().axes.push_back(event);
+    fn table_says(&mut self, event: AxesEvent) -> Vec<DeviceEvent> {
+        self.table.0.lock().unwrap().axes.push_back(event);
         self.hear()
     }
 
@@ -239,36 +245,36 @@ fn failures(said: &[DeviceEvent]) -> Vec<(u32, Cause)> {
 
 #[test]
 fn a_move_is_done_when_all_devices_are() {
-    let mut stage = Stage::homed();
-    stage.request(move_to(2, [0, 100, -200, 300]));
-    assert_eq!(stage.arm.told(), ["MoveTo([1000, 1100])"]);
-    assert_eq!(stage.stage.told(), ["MoveTo([-1200, -700])"]);
-    assert_eq!(stage.stage_says(AxesEvent::Done(at([-1200, -700]))), []);
-    let said = stage.arm_says(AxesEvent::Done(at([1000, 1100])));
+    let mut play = Play::homed();
+    play.request(move_to(2, [0, 100, -200, 300]));
+    assert_eq!(play.arm.told(), ["MoveTo([1000, 1100])"]);
+    assert_eq!(play.table.told(), ["MoveTo([-1200, -700])"]);
+    assert_eq!(play.table_says(AxesEvent::Done(at([-1200, -700]))), []);
+    let said = play.arm_says(AxesEvent::Done(at([1000, 1100])));
     let [DeviceEvent::Event(Event::Done(done))] = &said[..] else { panic!("{said:?}") };
     assert_eq!(done.readback.0[..], [0, 100, -200, 300]);
 }
 
 #[test]
 fn a_dwell_zeroes_once_settles_locates_exposes_and_locates() {
-    let mut stage = Stage::homed();
-    stage.request(dwell(2, Shutter::Open));
-    assert_eq!(stage.meter.told(), ["zero"]);
-    stage.meter_says(PhotometerEvent::Zeroed);
+    let mut play = Play::homed();
+    play.request(dwell(2, Shutter::Open));
+    assert_eq!(play.meter.told(), ["zero"]);
+    play.meter_says(PhotometerEvent::Zeroed);
     assert_eq!(
-        (stage.arm.told(), stage.stage.told()),
+        (play.arm.told(), play.table.told()),
         (vec!["Locate".into()], vec!["Locate".into()])
     );
-    stage.arm_says(AxesEvent::Located(at([1000, 1000])));
-    stage.stage_says(AxesEvent::Located(at([-1000, -1000])));
+    play.arm_says(AxesEvent::Located(at([1000, 1000])));
+    play.table_says(AxesEvent::Located(at([-1000, -1000])));
     // Settling: nothing but time ends it.
-    assert_eq!(stage.meter.told(), [""; 0]);
-    assert_eq!(stage.composer.poll_timeout(), Some(Instant::from_micros(1000)));
-    stage.now = Instant::from_micros(1000);
-    stage.composer.handle_timeout(stage.now);
-    assert_eq!(stage.meter.told(), ["expose 100"]);
+    assert_eq!(play.meter.told(), [""; 0]);
+    assert_eq!(play.composer.poll_timeout(), Some(Instant::from_micros(1000)));
+    play.now = Instant::from_micros(1000);
+    play.composer.handle_timeout(play.now);
+    assert_eq!(play.meter.told(), ["expose 100"]);
     let [began, ended] = [2000, 52_000].map(Instant::from_micros);
-    stage.meter_says(PhotometerEvent::Exposed(Exposed {
+    play.meter_says(PhotometerEvent::Exposed(Exposed {
         range: 1,
         readings: 100,
         mean: 5e-8,
@@ -280,9 +286,13 @@ fn a_dwell_zeroes_once_settles_locates_exposes_and_locates() {
         ended,
         device_time_s: Some(3.0),
     }));
-    stage.arm_says(AxesEvent::Located(at([1001, 1000])));
-    let said = stage.stage_says(AxesEvent::Located(at([-1000, -1000])));
-    let [DeviceEvent::Event(Event::Sampled(result))] = &said[..] else { panic!("{said:?}") };
+    play.arm_says(AxesEvent::Located(at([1001, 1000])));
+    let said = play.table_says(AxesEvent::Located(at([-1000, -1000])));
+    let [DeviceEvent::Clocks(id, times), DeviceEvent::Event(Event::Sampled(result))] = &said[..]
+    else {
+        panic!("{said:?}")
+    };
+    assert_eq!((*id, times.axes_s, times.photometer_s), (CommandId(2), None, Some(3.0)));
     // Half of the range's full scale, of 2^19 counts.
     assert!((result.mean - 262_144.0).abs() < 1e-6);
     assert!((result.variance / (1e-10_f64 / 1e-7 * 524_288.0).powi(2) - 1.0).abs() < 1e-12);
@@ -290,106 +300,103 @@ fn a_dwell_zeroes_once_settles_locates_exposes_and_locates() {
     assert_eq!((result.start.0[0], result.end.0[0]), (0, 1));
     assert_eq!(result.end_tick.micros_since(result.start_tick), 50_000);
 
-    stage.request(dwell(3, Shutter::Open));
-    assert_eq!(stage.meter.told(), [""; 0], "it is zeroed already");
+    play.request(dwell(3, Shutter::Open));
+    assert_eq!(play.meter.told(), [""; 0], "it is zeroed already");
 }
 
 #[test]
 fn what_can_t_be_done_is_refused_at_once() {
-    let mut stage = Stage::ready();
+    let mut play = Play::ready();
     let rejection = |said: Vec<DeviceEvent>| match &said[..] {
         [DeviceEvent::Reply { reply: Reply::Rejected(_, why), .. }] => *why,
         other => panic!("{other:?}"),
     };
-    assert_eq!(rejection(stage.request(move_to(1, [0; 4]))), Rejection::Unhomed(0));
-    assert_eq!(rejection(stage.request(dwell(1, Shutter::Closed))), Rejection::Unsupported);
-    let mut stage = Stage::homed();
-    let outside = rejection(stage.request(move_to(2, [0, 49_001, 0, 0])));
+    assert_eq!(rejection(play.request(move_to(1, [0; 4]))), Rejection::Unhomed(0));
+    assert_eq!(rejection(play.request(dwell(1, Shutter::Closed))), Rejection::Unsupported);
+    let mut play = Play::homed();
+    let outside = rejection(play.request(move_to(2, [0, 49_001, 0, 0])));
     assert_eq!(outside, Rejection::OutsideLimits(1, 49_001));
-    assert_eq!(rejection(stage.request(move_to(1, [0; 4]))), Rejection::IdReused);
+    assert_eq!(rejection(play.request(move_to(1, [0; 4]))), Rejection::IdReused);
 }
 
 #[test]
 fn a_stop_goes_to_whatever_moves_and_ends_all_commands_once_it_stands() {
-    let mut stage = Stage::homed();
-    stage.request(move_to(2, [0; 4]));
-    stage.request(move_to(3, [5; 4]));
-    stage.stage_says(AxesEvent::Done(at([-1000, -1000])));
-    (stage.arm.told(), stage.stage.told());
-    let said = stage.request(Request::Stop);
+    let mut play = Play::homed();
+    play.request(move_to(2, [0; 4]));
+    play.request(move_to(3, [5; 4]));
+    play.table_says(AxesEvent::Done(at([-1000, -1000])));
+    play.forget();
+    let said = play.request(Request::Stop);
     assert!(matches!(said[..], [DeviceEvent::Reply { reply: Reply::Stopping, .. }]));
-    assert_eq!((stage.arm.told(), stage.stage.told()), (vec!["stop".to_owned()], vec![]));
+    assert_eq!((play.arm.told(), play.table.told()), (vec!["stop".to_owned()], vec![]));
     // Asked for before it stands: answered after.
-    assert_eq!(stage.request(Request::ClearFault), []);
-    let said = stage.arm_says(AxesEvent::Stopped(Some(at([900, 1000]))));
+    assert_eq!(play.request(Request::ClearFault), []);
+    let said = play.arm_says(AxesEvent::Stopped(Some(at([900, 1000]))));
     assert_eq!(failures(&said), [(2, Cause::Stopped), (3, Cause::Stopped)]);
     assert!(matches!(said.last(), Some(DeviceEvent::Reply { reply: Reply::Cleared, .. })));
-    stage.request(move_to(4, [0; 4]));
-    assert_eq!(stage.arm.told(), ["MoveTo([1000, 1000])"]);
+    play.request(move_to(4, [0; 4]));
+    assert_eq!(play.arm.told(), ["MoveTo([1000, 1000])"]);
 }
 
 #[test]
 fn a_fault_of_one_device_stops_the_other_and_keeps_its_name() {
-    let mut stage = Stage::homed();
-    stage.request(move_to(2, [0; 4]));
-    (stage.arm.told(), stage.stage.told());
+    let mut play = Play::homed();
+    play.request(move_to(2, [0; 4]));
+    play.forget();
     let alarm = fault(Cause::LimitSwitch(0), true);
-    let said = stage.arm_says(AxesEvent::Trouble(Trouble::Fault(alarm.clone())));
+    let said = play.arm_says(AxesEvent::Trouble(Trouble::Fault(alarm.clone())));
     assert_eq!(said, [DeviceEvent::Fault(alarm.clone())]);
-    assert_eq!((stage.arm.told(), stage.stage.told()), (vec![], vec!["stop".to_owned()]));
-    let said = stage.stage_says(AxesEvent::Stopped(Some(at([0, 0]))));
+    assert_eq!((play.arm.told(), play.table.told()), (vec![], vec!["stop".to_owned()]));
+    let said = play.table_says(AxesEvent::Stopped(Some(at([0, 0]))));
     assert_eq!(failures(&said), [(2, Cause::LimitSwitch(0))]);
     // Its own axes lost their home, the other's did not.
-    let said = stage.request(Request::ReadStatus);
+    let said = play.request(Request::ReadStatus);
     let [DeviceEvent::Reply { reply: Reply::Status(status), .. }] = &said[..] else { panic!() };
     assert_eq!((status.homed, status.fault), (AxisMask(0b1100), Some(Cause::LimitSwitch(0))));
-    stage.request(Request::ClearFault);
-    assert_eq!(stage.arm.told(), ["Clear"]);
+    play.request(Request::ClearFault);
+    assert_eq!(play.arm.told(), ["Clear"]);
     let again = AxesEvent::Trouble(Trouble::Fault(alarm));
-    let said = stage.arm_says(again);
+    let said = play.arm_says(again);
     let Some(DeviceEvent::Reply { reply: Reply::Rejected(_, why), .. }) = said.last() else {
         panic!("{said:?}")
     };
     assert_eq!(*why, Rejection::Faulted(Cause::LimitSwitch(0)));
-    stage.request(Request::ClearFault);
-    let said = stage.arm_says(AxesEvent::Cleared);
+    play.request(Request::ClearFault);
+    let said = play.arm_says(AxesEvent::Cleared);
     assert!(matches!(said[..], [DeviceEvent::Reply { reply: Reply::Cleared, .. }]));
 }
 
 #[test]
 fn when_the_meter_dies_the_axes_are_stopped() {
-    let mut stage = Stage::homed();
-    stage.request(move_to(2, [0; 4]));
-    (stage.arm.told(), stage.stage.told());
+    let mut play = Play::homed();
+    play.request(move_to(2, [0; 4]));
+    play.forget();
     let lost = LinkLost::HungUp { port: "meter".into(), detail: "gone".into() };
-    stage.composer.port_gone(stage.now, 2, lost.clone());
-    assert_eq!(stage.hear(), [DeviceEvent::LinkLost(lost)]);
-    assert_eq!((stage.arm.told(), stage.stage.told()), (vec!["stop".into()], vec!["stop".into()]));
-    assert!(!stage.composer.is_at_rest());
-    stage.arm_says(AxesEvent::Stopped(None));
+    play.composer.port_gone(play.now, 2, lost.clone());
+    assert_eq!(play.hear(), [DeviceEvent::LinkLost(lost)]);
+    assert_eq!((play.arm.told(), play.table.told()), (vec!["stop".into()], vec!["stop".into()]));
+    assert!(!play.composer.is_at_rest());
+    play.arm_says(AxesEvent::Stopped(None));
     assert_eq!(
-        stage.stage_says(AxesEvent::Stopped(None)),
+        play.table_says(AxesEvent::Stopped(None)),
         [],
         "the session's commands are forgotten"
     );
-    assert!(stage.composer.is_at_rest());
+    assert!(play.composer.is_at_rest());
 }
 
 #[test]
 fn a_board_that_boots_ends_the_session_and_loses_its_home() {
-    let mut stage = Stage::homed();
-    stage.request(move_to(2, [0; 4]));
-    let said = stage.arm_says(AxesEvent::Trouble(Trouble::Restarted));
+    let mut play = Play::homed();
+    play.request(move_to(2, [0; 4]));
+    let said = play.arm_says(AxesEvent::Trouble(Trouble::Restarted));
     assert_eq!(said, [DeviceEvent::Restarted { old: 7, new: 8 }]);
-    stage.stage_says(AxesEvent::Stopped(None));
-    (stage.arm.told(), stage.stage.told());
+    play.table_says(AxesEvent::Stopped(None));
+    play.forget();
     // Another session asks the one who he is, and the other for a sign of life.
-    stage.order(Order::Identify);
-    assert_eq!(
-        (stage.arm.told(), stage.stage.told()),
-        (vec!["open".into()], vec!["Locate".into()])
-    );
-    stage.arm_says(AxesEvent::Ready(facts()));
-    let said = stage.stage_says(AxesEvent::Located(at([0, 0])));
+    play.order(Order::Identify);
+    assert_eq!((play.arm.told(), play.table.told()), (vec!["open".into()], vec!["Locate".into()]));
+    play.arm_says(AxesEvent::Ready(facts()));
+    let said = play.table_says(AxesEvent::Located(at([0, 0])));
     assert!(matches!(said[..], [DeviceEvent::Reply { reply: Reply::Identity(_), .. }]));
 }

@@ -10,6 +10,7 @@ use super::part::Awaited;
 use super::queue::Command;
 use super::{Composer, DeviceEvent};
 use crate::device::axes::AxesCommand;
+use crate::rig::DeviceTimes;
 
 /// A command that runs.
 #[derive(Debug)]
@@ -212,6 +213,9 @@ impl Composer {
         let Some(exposed) = self.meter.exposed.take() else { return };
         let ends = [dwelling.start.clone(), self.counts_here()];
         let result = self.meter.result(&dwelling.dwell, &exposed, ends);
+        let times =
+            DeviceTimes { axes_s: self.meter.axes_time_s, photometer_s: exposed.device_time_s };
+        self.say(DeviceEvent::Clocks(id, times));
         self.end(id, Event::Sampled(result));
     }
 }

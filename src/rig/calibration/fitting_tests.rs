@@ -96,6 +96,7 @@ fn at_rest(id: u32, kind: ReadingKind, at: Latched, gain: u8) -> Reading {
         end_us: begin + 50_000,
         time_s: f64::from(id),
         session: 0,
+        device_times: crate::rig::DeviceTimes::default(),
         link_retries: 0,
         unsettled: false,
     }

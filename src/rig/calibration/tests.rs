@@ -37,6 +37,7 @@ fn reading(rig: &Rig, id: u32, kind: ReadingKind, radiance: f64, dark_a: f64) ->
         end_us: begin + 50_000,
         time_s: f64::from(id),
         session: 0,
+        device_times: crate::rig::DeviceTimes::default(),
         link_retries: 0,
         unsettled: false,
     }
