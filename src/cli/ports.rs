@@ -12,7 +12,7 @@ use super::failure::{Failure, Outcome};
 use super::output::{note, say, say_json};
 use super::session::draw_session;
 use super::text::table;
-use crate::device::{Controller, SerialSettings, list_ports, open_serial};
+use crate::device::{self, Found, Greeting, SerialSettings, list_ports, open_serial};
 
 /// A board that was reset by opening its port listens after two or three seconds.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -47,22 +47,30 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
         reset_on_open: false,
         boot_wait: Duration::ZERO,
     };
-    let identity = runtime.block_on(async {
+    let found = runtime.block_on(async {
         let link = open_serial(&settings).await.map_err(Failure::start)?;
-        let (_, identity) = Controller::connect(link, draw_session(), baud, PATIENCE)
-            .await
-            .map_err(Failure::start)?;
-        Ok::<_, Failure>(identity)
+        device::probe(link, draw_session(), baud, PATIENCE).await.map_err(Failure::start)
     })?;
     if is_json {
-        say_json(&as_json(port, baud, &identity))?;
+        let mut document = match &found {
+            Found::Controller(identity) => as_json(identity),
+            Found::Grbl(greeting) => grbl_as_json(greeting),
+            Found::Instrument(name) => json!({ "kind": "instrument", "identity": name }),
+        };
+        document["port"] = json!(port);
+        document["baud"] = json!(baud);
+        say_json(&document)?;
     } else {
-        say(&as_text(&identity))?;
+        say(&match &found {
+            Found::Controller(identity) => as_text(identity),
+            Found::Grbl(greeting) => grbl_as_text(greeting),
+            Found::Instrument(name) => format!("  an instrument that calls itself {name}\n"),
+        })?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(port: &str, baud: u32, identity: &Identity) -> serde_json::Value {
+fn as_json(identity: &Identity) -> serde_json::Value {
     let axes: Vec<_> = identity
         .axes
         .iter()
@@ -76,11 +84,32 @@ fn as_json(port: &str, baud: u32, identity: &Identity) -> serde_json::Value {
         .collect();
     let (major, minor) = identity.protocol;
     json!({
-        "port": port, "baud": baud, "protocol": format!("{major}.{minor}"),
+        "kind": "gonio", "protocol": format!("{major}.{minor}"),
         "boot_id": identity.boot_id, "axes": axes, "gains": identity.gains,
         "adc_bits": identity.adc_bits, "adc_rate_hz": identity.adc_rate_hz,
         "queue_depth": identity.queue_depth, "lease_ms": identity.lease_ms,
     })
+}
+
+fn grbl_as_json(greeting: &Greeting) -> serde_json::Value {
+    let Greeting { version, state, axes, position } = greeting;
+    json!({
+        "kind": "grbl", "version": version, "state": state, "axes": axes, "position": position,
+        "watchdog": null,
+    })
+}
+
+fn grbl_as_text(greeting: &Greeting) -> String {
+    let Greeting { version, state, axes, position } = greeting;
+    let version = version.as_ref().map_or_else(
+        || "of a version that it was not asked for, since it moves".to_owned(),
+        |version| format!("of version {version}"),
+    );
+    let position: Vec<String> = position.iter().map(f64::to_string).collect();
+    format!(
+        "  a board with grbl {version}: {state}, {axes} axes at {}; no device watchdog\n",
+        position.join(", ")
+    )
 }
 
 fn as_text(identity: &Identity) -> String {

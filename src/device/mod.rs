@@ -18,6 +18,7 @@ mod link;
 mod native;
 mod photometer;
 mod ports;
+mod probe;
 mod serial;
 
 pub use agreement::{Disagreement, QUEUE_DEPTH_MIN, check_agreement};
@@ -25,11 +26,12 @@ pub use axes::{Axes, AxesCommand, AxesEvent, AxesFacts, AxisFacts, Located};
 pub use composed::Composer;
 pub use controller::{ConnectError, Controller, DeviceEvent, LinkLost};
 pub use driver::{Driver, NamedFault, Promises, Refusal, Trouble};
-pub use grbl::Grbl;
+pub use grbl::{Grbl, Greeting};
 pub use keithley::Keithley;
 pub use link::{Link, Opener, Openers, Opening, opener};
 pub use photometer::{
     Exposed, Exposure, Photometer, PhotometerCommand, PhotometerEvent, PhotometerFacts,
 };
 pub use ports::{PortEntry, list_ports};
+pub use probe::{Found, probe};
 pub use serial::{SerialError, SerialSettings, open_serial, serial_opener};

@@ -12,6 +12,7 @@
 
 mod codec;
 mod going;
+mod greeting;
 mod opening;
 mod settings;
 mod stopping;
@@ -28,6 +29,8 @@ use super::axes::{Axes, AxesCommand, AxesEvent, Located};
 use super::driver::{Driver, NamedFault, Promises, Trouble};
 use crate::rig::GrblOutput;
 use codec::{Lines, Message, Position, Report, State, describe_alarm, describe_error};
+pub use greeting::Greeting;
+pub(super) use greeting::Listener;
 use settings::{Board, whole};
 use stream::{Purpose, Stream};
 
