@@ -60,6 +60,16 @@ pub enum FitError {
         /// As handed in.
         penalty: Penalty,
     },
+    /// A field that is below zero somewhere however it was held up. Ask for a lower degree, or for no
+    /// bound at zero.
+    StillNegative {
+        /// Rays of the grid along which it is.
+        below: usize,
+        /// All rays of the grid.
+        rays: usize,
+        /// The least radiance among them, in the values' unit.
+        least: f64,
+    },
     /// A truncation that is negative or not finite.
     Truncation {
         /// As handed in.
@@ -173,6 +183,7 @@ pub enum FitError {
 impl fmt::Display for FitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::StillNegative { below, rays, least } => still_negative(f, *below, *rays, *least),
             Self::Empty => f.write_str("no samples: there is nothing to fit"),
             Self::Region => f.write_str(
                 "region: ends must be finite and in order, theta_max above 0° and at most 90° (180° \
@@ -296,6 +307,19 @@ fn undetermined(
 }
 
 impl std::error::Error for FitError {}
+
+fn still_negative(
+    f: &mut fmt::Formatter<'_>,
+    below: usize,
+    rays: usize,
+    least: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "the field stays below zero along {below} of {rays} rays, down to {least:.3e}, however it is held \
+         up; expected a basis that can be zero there: ask for a lower degree, or for no bound at zero"
+    )
+}
 
 fn basis_of_chart(f: &mut fmt::Formatter<'_>, kind: &str, chart: &str) -> fmt::Result {
     let expected = match chart {

@@ -9,7 +9,7 @@
 //! u is left as it was. Where the bound holds it is too large rather than too small: that L can't be
 //! negative says more than the readings do, but to one side only, which no standard uncertainty tells.
 
-use crate::basis::dot;
+use crate::basis::{Directions, dot};
 use crate::{Fit, FitError, Parts, Ray, Region, sparse};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -30,26 +30,31 @@ pub struct Nonnegative {
 impl Fit {
     /// The nearest field that is not below zero along any ray of a grid over the region, finer than
     /// the basis bends; between its rays it may be, by what a basis bends between two of them.
-    /// A fit in many local functions ([`is_sparse`](Self::is_sparse)) is refused.
+    /// A fit in many local functions ([`is_sparse`](Self::is_sparse)) is refused, and so is a field
+    /// that some ray of the grid is still below zero along in the end.
     pub fn nonnegative(&self) -> Result<(Self, Nonnegative), FitError> {
+        self.nonnegative_in(ROUNDS_MAX)
+    }
+
+    fn nonnegative_in(&self, rounds: usize) -> Result<(Self, Nonnegative), FitError> {
         if self.is_sparse() {
             return Err(sparse::refusal("a field nowhere below zero"));
         }
-        let rays = grid(self.region(), self.functions().directions().fineness(), {
-            self.functions().places().fineness()
-        });
+        let rays = grid(
+            self.region(),
+            &rings(self.functions().directions(), self.region().theta_max_rad),
+            self.functions().places().fineness(),
+        );
         let size = self.coefficients().iter().fold(0.0, |size: f64, c| size.max(c.abs()));
         let tolerance = BELOW_RELATIVE * size;
         let mut held = Held::new(self);
         let mut coefficients = self.coefficients().to_vec();
-        let mut least = 0.0_f64;
-        for round in 0..ROUNDS_MAX {
-            let values = self.along(&rays, &coefficients);
-            if round == 0 {
-                least = values.iter().copied().fold(f64::INFINITY, f64::min);
-            }
-            let mut below: Vec<usize> =
-                (0..rays.len()).filter(|i| values[*i] < -tolerance).collect();
+        let mut values = self.along(&rays, &coefficients);
+        let lowest = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+        let least = lowest(&values);
+        for _ in 0..rounds {
+            let is_new = |i: &usize| values[*i] < -tolerance && !held.taken.contains(i);
+            let mut below: Vec<usize> = (0..rays.len()).filter(is_new).collect();
             if below.is_empty() {
                 break;
             }
@@ -57,6 +62,17 @@ impl Fit {
             below.truncate(TAKEN_AT_A_TIME);
             held.take(&below, &rays);
             coefficients = held.solve(self).ok_or(FitError::OutOfRange)?;
+            values = self.along(&rays, &coefficients);
+        }
+        let left = lowest(&values);
+        if left < -HELD_RELATIVE * size {
+            let below = values.iter().filter(|value| **value < -HELD_RELATIVE * size).count();
+            return Err(FitError::StillNegative { below, rays: rays.len(), least: left });
+        }
+        if held.taken.is_empty() {
+            let unchanged =
+                Nonnegative { held: Vec::new(), rays: rays.len(), least, exitance: 0.0 };
+            return Ok((self.clone(), unchanged));
         }
         let parts = Parts { coefficients, ..self.parts().clone() };
         let fit = self.with_parts(parts);
@@ -102,9 +118,6 @@ impl Held {
         let p = self.basis.len();
         let mut row = vec![0.0; p];
         for &i in below {
-            if self.taken.contains(&i) {
-                continue;
-            }
             self.basis.row(&rays[i], &mut self.scratch, &mut row);
             self.fit_values.push(dot(&row, &self.coefficients));
             let column = |j: usize| &self.factor[j * (j + 1) / 2..][..=j];
@@ -193,9 +206,30 @@ fn least_forces(q: &Mat<f64>, b: &[f64]) -> Option<Vec<f64>> {
     forces.iter().all(|force| force.is_finite()).then_some(forces)
 }
 
-/// Rays over the region: polar angles evenly, azimuths the more the farther from the pole.
-fn grid(region: &Region, directions: usize, places: usize) -> Vec<Ray> {
-    let rings = 2 * directions + 4;
+/// Polar angles and how many azimuths at each: evenly, the more azimuths the farther from the pole;
+/// where splines are finer in a stretch there alone.
+fn rings(directions: &Directions, theta_max_rad: f64) -> Vec<(f64, usize)> {
+    if let Some(rings) = directions.rings() {
+        let mut rings: Vec<(f64, usize)> =
+            rings.into_iter().filter(|(theta_rad, _)| *theta_rad < theta_max_rad).collect();
+        let round = rings.last().map_or(1, |(_, round)| *round);
+        rings.push((theta_max_rad, round));
+        return rings;
+    }
+    let fineness = directions.fineness();
+    let count = 2 * fineness + 4;
+    let ring = |ring: usize| {
+        let theta_rad = theta_max_rad * ring as f64 / count as f64;
+        let round = 4.0 * (fineness + 1) as f64 * libm::sin(theta_rad);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small count
+        let spokes = libm::ceil(round).max(1.0) as usize;
+        (theta_rad, spokes)
+    };
+    (0..=count).map(ring).collect()
+}
+
+/// Rays over the region along these rings.
+fn grid(region: &Region, rings: &[(f64, usize)], places: usize) -> Vec<Ray> {
     let side = 2 * places + 1;
     let between = |(from, to): (f64, f64), i: usize| {
         if side == 1 {
@@ -205,11 +239,7 @@ fn grid(region: &Region, directions: usize, places: usize) -> Vec<Ray> {
         }
     };
     let mut rays = Vec::new();
-    for ring in 0..=rings {
-        let theta_rad = region.theta_max_rad * ring as f64 / rings as f64;
-        let round = 4.0 * (directions + 1) as f64 * libm::sin(theta_rad);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small count
-        let spokes = libm::ceil(round).max(1.0) as usize;
+    for &(theta_rad, spokes) in rings {
         for spoke in 0..spokes {
             let phi_rad = core::f64::consts::TAU * spoke as f64 / spokes as f64;
             for at in 0..side * side {
@@ -226,6 +256,9 @@ fn grid(region: &Region, directions: usize, places: usize) -> Vec<Ray> {
 
 /// Less below zero than this part of the largest coefficient is rounding.
 const BELOW_RELATIVE: f64 = 1e-9;
+/// What a field may stay below zero along a ray that holds it up, as a part of the largest coefficient:
+/// forces push to no more digits.
+const HELD_RELATIVE: f64 = 1e-6;
 /// Rays taken in before the forces are found anew.
 const TAKEN_AT_A_TIME: usize = 20;
 /// Rounds at most.
@@ -238,6 +271,52 @@ const RIDGE: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Angular, BasisSpec, Fine, Noise, Position, Sample};
+
+    /// A narrow lobe on a dark floor, which plain splines undershoot.
+    fn undershooting(angular: Angular) -> Fit {
+        let region = Region::surface((0.0, 0.0), (0.0, 0.0), 1.4);
+        let noise = Noise::Fixed { variance: 1e-6 };
+        let mut samples = Vec::new();
+        for ring in 0..=140 {
+            for spoke in 0..24 {
+                let theta_rad = 0.01 * f64::from(ring);
+                let phi_rad = core::f64::consts::TAU * f64::from(spoke) / 24.0;
+                let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad };
+                let value = libm::exp(-(theta_rad / 0.08).powi(2));
+                samples.push(Sample { ray, value, noise });
+            }
+        }
+        let basis = BasisSpec { angular, position: Position::Legendre { degree: 0 } };
+        crate::fit(&samples, &region, basis, &[]).unwrap()
+    }
+
+    #[test]
+    fn what_is_not_held_in_time_is_no_answer() {
+        let fit = undershooting(Angular::Zernike { degree: 8, cosine_columns: 0 });
+        let Err(FitError::StillNegative { below, rays, least }) = fit.nonnegative_in(1) else {
+            panic!("held by one round")
+        };
+        assert!(below > 0 && rays > below && least < 0.0, "{below} of {rays}, {least}");
+        let (held, bound) = fit.nonnegative().unwrap();
+        assert!(bound.least < -1e-3 && !bound.held.is_empty());
+        assert!(bound.held.iter().all(|ray| held.value(ray) > -1e-5));
+    }
+
+    #[test]
+    fn refined_splines_are_looked_at_finely_where_they_are_fine() {
+        let fine = Fine { from: 0, to: 1, halvings: 4 };
+        let splines = Angular::Splines { theta_spans: 6, phi_spans: 6, fine };
+        let fit = undershooting(splines);
+        let (held, bound) = fit.nonnegative().unwrap();
+        // As finely everywhere there would be 45,000.
+        assert!((500..8000).contains(&bound.rays), "{}", bound.rays);
+        for step in 0..2800 {
+            let theta_rad = 5e-4 * f64::from(step);
+            let value = held.value(&Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad: 0.7 });
+            assert!(value > 0.3 * bound.least.min(-1e-4), "{theta_rad}: {value} {}", bound.least);
+        }
+    }
 
     #[test]
     fn forces_push_where_there_is_need_and_nowhere_else() {

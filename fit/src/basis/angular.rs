@@ -222,6 +222,15 @@ impl Directions {
         }
     }
 
+    /// Polar angles and how many azimuths at each tell splines' functions apart, twice; `None` of
+    /// functions that are as fine everywhere.
+    pub(crate) fn rings(&self) -> Option<Vec<(f64, usize)>> {
+        match self {
+            Self::Splines(splines) => Some(splines.rings()),
+            _ => None,
+        }
+    }
+
     /// How fine a grid has to be that no lobe slips through: as for polynomials of this degree.
     pub(crate) fn fineness(&self) -> usize {
         match self {

@@ -138,6 +138,18 @@ impl PolarSplines {
         along.max(self.phi_spans.div_ceil(2))
     }
 
+    /// Two polar angles a span of θ, and two azimuths a function that goes round there.
+    pub(crate) fn rings(&self) -> Vec<(f64, usize)> {
+        let spans = self.breaks.windows(2).enumerate();
+        let rings = spans.flat_map(|(i, span)| {
+            // The splines that are not zero over the span.
+            let round = self.bands[i..=i + DEGREE].iter().map(|placed| placed.band.len()).max();
+            let round = 2 * round.unwrap_or(1);
+            [(span[0], round), (f64::midpoint(span[0], span[1]), round)]
+        });
+        rings.collect()
+    }
+
     /// All values in a direction; below the horizon those at it.
     pub(crate) fn evaluate_direction(&self, d: DVec3, out: &mut [f64]) {
         out.fill(0.0);
