@@ -274,7 +274,7 @@ fn unsound_penalty(f: &mut fmt::Formatter<'_>, penalty: &Penalty) -> fmt::Result
     write!(
         f,
         "penalty of power {power} and strength {strength}: expected a finite strength of 0 or more \
-         and a power of 0 to 8 (of splines 1 or 2)"
+         and a power of 0 to 18 (of splines 1 or 2)"
     )
 }
 

@@ -395,4 +395,4 @@ impl Form {
 }
 
 /// Beyond it nothing but the constant would be left.
-const POWER_MAX: f64 = 8.0;
+const POWER_MAX: f64 = 18.0;

@@ -11,12 +11,13 @@ use radiometry::quadrature::cone;
 use scenes::{Die, REGION, exact, spread_rays};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-const ANGULAR: [Angular; 5] = [
+const ANGULAR: [Angular; 6] = [
     Angular::Zernike { degree: 5, cosine_columns: 0 },
     Angular::Zernike { degree: 5, cosine_columns: 3 },
     Angular::Hemispherical { degree: 3 },
     Angular::EvenHarmonics { degree: 5 },
     Angular::Splines { theta_spans: 5, phi_spans: 9, fine: Fine { from: 1, to: 3, halvings: 2 } },
+    Angular::Spherical { degree: 4 },
 ];
 const POSITION: [Position; 3] = [
     Position::Legendre { degree: 0 },
@@ -169,6 +170,7 @@ fn a_penalty_fills_gaps_with_uncertainty_and_few_readings_are_enough() {
     for angular in [
         Angular::Zernike { degree: 14, cosine_columns: 2 },
         Angular::Hemispherical { degree: 10 },
+        Angular::Spherical { degree: 10 },
         Angular::Splines { theta_spans: 10, phi_spans: 12, fine: Fine::NONE },
     ] {
         let basis = BasisSpec { angular, position: Position::Legendre { degree: 0 } };

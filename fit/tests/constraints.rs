@@ -168,6 +168,7 @@ fn every_kind_of_basis_is_symmetric_or_says_that_it_cannot_be() {
         fit::Angular::Zernike { degree: 8, cosine_columns: 2 },
         fit::Angular::Hemispherical { degree: 6 },
         fit::Angular::EvenHarmonics { degree: 8 },
+        fit::Angular::Spherical { degree: 6 },
     ] {
         let (round, test) = of(angular).symmetric(Symmetry::Rotational).unwrap();
         assert!(test.p > 0.01, "{test:?}");

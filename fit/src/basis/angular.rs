@@ -26,7 +26,11 @@ pub(crate) enum Directions {
         even: Vec<usize>,
     },
     Splines(PolarSplines),
-    Spherical(SphericalHarmonics),
+    /// Over the whole sphere, or over the hemisphere alone: there they are not orthogonal.
+    Spherical {
+        all: SphericalHarmonics,
+        is_whole: bool,
+    },
     /// Functions of the ray: see [`super::Basis::direction_of`].
     SecondPlane(SecondPlane),
 }
@@ -62,9 +66,10 @@ impl Directions {
             Angular::Splines { theta_spans, phi_spans, fine } => {
                 Self::Splines(PolarSplines::new(theta_spans, phi_spans, fine).map_err(refused)?)
             }
-            Angular::Spherical { degree } => {
-                Self::Spherical(SphericalHarmonics::new(degree).map_err(refused)?)
-            }
+            Angular::Spherical { degree } => Self::Spherical {
+                all: SphericalHarmonics::new(degree).map_err(refused)?,
+                is_whole: chart.is_whole_sphere(),
+            },
             Angular::SecondPlane { degree } => {
                 Self::SecondPlane(SecondPlane::new(degree, chart)?.ok_or_else(foreign)?)
             }
@@ -79,7 +84,7 @@ impl Directions {
             Self::Hemispherical(harmonics) => harmonics.len(),
             Self::Even { even, .. } => even.len(),
             Self::Splines(splines) => splines.len(),
-            Self::Spherical(harmonics) => harmonics.len(),
+            Self::Spherical { all, .. } => all.len(),
             Self::SecondPlane(plane) => plane.len(),
         }
     }
@@ -116,7 +121,7 @@ impl Directions {
                 out.iter_mut().zip(even).for_each(|(out, k)| *out = room[*k]);
             }
             Self::Splines(splines) => splines.evaluate_direction(d, out),
-            Self::Spherical(harmonics) => harmonics.evaluate(d, out),
+            Self::Spherical { all, .. } => all.evaluate(d, out),
             // From the middle of the first plane, for want of a place.
             Self::SecondPlane(plane) => plane.evaluate((0.0, 0.0), d, &mut plane.lines(), out),
         }
@@ -136,7 +141,7 @@ impl Directions {
                 // In closed form where there is one.
                 zernike.integrals_within(theta_max_rad, &mut out[..zernike.len()])
             }
-            Self::Hemispherical(_) | Self::Even { .. } | Self::Spherical(_) => {
+            Self::Hemispherical(_) | Self::Even { .. } | Self::Spherical { .. } => {
                 self.integrate_rounds(theta_max_rad, out);
                 Ok(())
             }
@@ -152,7 +157,7 @@ impl Directions {
     /// rounding; the others have none.
     fn integrate_rounds(&self, theta_max_rad: f64, out: &mut [f64]) {
         out.fill(0.0);
-        let is_whole = matches!(self, Self::Spherical(_));
+        let is_whole = matches!(self, Self::Spherical { is_whole: true, .. });
         let low = libm::cos(theta_max_rad).max(if is_whole { -1.0 } else { 0.0 });
         let (middle, half) = (f64::midpoint(low, 1.0), (1.0 - low) / 2.0);
         let (mut values, mut room) = (vec![0.0; self.len()], self.room());
@@ -175,7 +180,7 @@ impl Directions {
         match self {
             Self::Zernike { zernike, .. } if k < zernike.len() => ansi_order(k),
             Self::Zernike { zernike, .. } => (2 * (k - zernike.len()) + 1, 0),
-            Self::Hemispherical(_) | Self::Spherical(_) => {
+            Self::Hemispherical(_) | Self::Spherical { .. } => {
                 let l = k.isqrt();
                 (l, signed(k) - signed(l * (l + 1)))
             }
@@ -206,7 +211,7 @@ impl Directions {
                 zernike.degree().max(cosine.as_ref().map_or(0, |c| 2 * c.columns))
             }
             Self::Hemispherical(harmonics) => 2 * harmonics.len().isqrt(),
-            Self::Even { all, .. } | Self::Spherical(all) => all.degree(),
+            Self::Even { all, .. } | Self::Spherical { all, .. } => all.degree(),
             Self::Splines(splines) => splines.fineness(),
             Self::SecondPlane(plane) => plane.degree(),
         }
@@ -217,7 +222,7 @@ impl Directions {
     pub(crate) fn mirrored_degree(&self) -> Option<usize> {
         match self {
             Self::Zernike { zernike, cosine: None } => Some(zernike.degree()),
-            Self::Even { all, .. } | Self::Spherical(all) => Some(all.degree()),
+            Self::Even { all, .. } | Self::Spherical { all, is_whole: true } => Some(all.degree()),
             _ => None,
         }
     }
@@ -237,7 +242,7 @@ impl Directions {
             Self::Zernike { .. }
             | Self::Even { .. }
             | Self::Splines(_)
-            | Self::Spherical(_)
+            | Self::Spherical { .. }
             | Self::SecondPlane(_) => self.trigonometric_degree(),
             Self::Hemispherical(harmonics) => harmonics.len().isqrt() - 1,
         }
@@ -265,8 +270,8 @@ impl Directions {
                 let degree = harmonics.len().isqrt() - 1;
                 Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
             }
-            Self::Spherical(harmonics) => {
-                let degree = harmonics.degree();
+            Self::Spherical { all, .. } => {
+                let degree = all.degree();
                 Some(Needs { degree, theta: degree + 1, theta_with_pole: degree + 1 })
             }
             Self::Splines(_) | Self::SecondPlane(_) => None,
@@ -279,7 +284,7 @@ impl Directions {
         match self {
             Self::Zernike { .. } => out[0] = PI.sqrt(),
             Self::Hemispherical(_) => out[0] = TAU.sqrt(),
-            Self::Even { .. } | Self::Spherical(_) => out[0] = (2.0 * TAU).sqrt(),
+            Self::Even { .. } | Self::Spherical { .. } => out[0] = (2.0 * TAU).sqrt(),
             Self::SecondPlane(_) => out[0] = 1.0,
             Self::Splines(splines) => splines.unity(out),
         }
@@ -298,7 +303,9 @@ impl Directions {
             Self::Zernike { .. } => (degree / PI).sqrt(),
             // By the addition theorem all of a degree have squares that sum to (2l+1)/4π.
             Self::Hemispherical(_) => ((2.0 * degree + 1.0) / TAU).sqrt(),
-            Self::Even { .. } | Self::Spherical(_) => ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt(),
+            Self::Even { .. } | Self::Spherical { .. } => {
+                ((2.0 * degree + 1.0) / (2.0 * TAU)).sqrt()
+            }
             Self::SecondPlane(plane) => plane.largest(k),
             Self::Splines(_) => 1.0,
         }
@@ -311,7 +318,7 @@ impl Directions {
             Self::Zernike { zernike, .. } if k < zernike.len() => format!("Z({n},{m})"),
             Self::Zernike { .. } => format!("cos Z({},0)", n - 1),
             Self::Hemispherical(_) => format!("H({n},{m})"),
-            Self::Even { .. } | Self::Spherical(_) => format!("Y({n},{m})"),
+            Self::Even { .. } | Self::Spherical { .. } => format!("Y({n},{m})"),
             Self::SecondPlane(plane) => plane.name(k),
             Self::Splines(splines) => splines.name(k),
         }

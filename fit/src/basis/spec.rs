@@ -48,7 +48,9 @@ pub enum Angular {
         fine: Fine,
     },
     /// Spherical harmonics up to degree l, (l + 1)² of them: directions all round, of the
-    /// perpendicular and the environment chart.
+    /// perpendicular and the environment chart. On the surface chart their upper half: nothing of
+    /// them is bound at the horizon, and they are not independent of each other there, so that they
+    /// want a [`Penalty`](crate::Penalty), under which they are a Gaussian process on the sphere.
     Spherical {
         /// The degree l.
         degree: usize,
@@ -177,7 +179,7 @@ impl Angular {
     /// Whether they are functions of that chart's rays.
     pub const fn is_of(&self, chart: &Chart) -> bool {
         match self {
-            Self::Spherical { .. } => chart.is_whole_sphere(),
+            Self::Spherical { .. } => chart.is_whole_sphere() || matches!(chart, Chart::Surface),
             Self::SecondPlane { .. } => matches!(chart, Chart::TwoPlane { .. }),
             _ => matches!(chart, Chart::Surface),
         }

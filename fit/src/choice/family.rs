@@ -286,5 +286,5 @@ const FREEDOM: f64 = 4.0;
 const DETERMINED_MIN: f64 = 1e-10;
 /// Powers of the degree that a penalty is tried with: from middling fields to very smooth ones, and
 /// for fields with edges.
-const SMOOTHER: [f64; 4] = [2.0, 3.0, 5.0, 8.0];
+const SMOOTHER: [f64; 6] = [2.0, 3.0, 5.0, 8.0, 12.0, 18.0];
 const ROUGHER: [f64; 1] = [1.0];

@@ -51,8 +51,8 @@ impl AngularKind {
         Self::SecondPlane,
     ];
     /// Those of the surface chart.
-    pub const OF_SURFACE: [Self; 4] =
-        [Self::Zernike, Self::Hemispherical, Self::EvenHarmonics, Self::Splines];
+    pub const OF_SURFACE: [Self; 5] =
+        [Self::Zernike, Self::Hemispherical, Self::EvenHarmonics, Self::Spherical, Self::Splines];
 
     /// The one that has degrees, and is taken where a degree is named and no kind.
     pub const fn of_chart(chart: &Chart) -> Self {
@@ -166,7 +166,7 @@ pub struct Candidate {
     /// Its coefficients.
     pub coefficients: usize,
     /// Mean log density of the readings of sweeps left out, less that of the chosen one; natural
-    /// logarithms a reading. A coarser basis may do better by up to 0.1: the chosen one is the finest
+    /// logarithms a reading. A coarser basis may do better by up to 0.05: the chosen one is the finest
     /// of its kind that does about as well as the best.
     pub score: f64,
     /// RMS error of predictions of the readings left out, over their stated u.
@@ -317,7 +317,7 @@ fn truncation(tried: &[(BasisSpec, Trial)]) -> f64 {
 const PLAIN_LINES_MIN: usize = 4;
 /// A basis with fewer functions by this factor is a coarser one.
 const COARSER: f64 = 1.2;
-/// What a finer basis may cost in log density a reading: a tenth of u.
-const FINER_COST: f64 = 0.1;
+/// What a finer basis may cost in log density a reading: a twentieth of u.
+const FINER_COST: f64 = 0.05;
 /// Azimuths closer than half a degree are one where all else is.
 const ANGLE_OF_A_POSE: f64 = 0.009;

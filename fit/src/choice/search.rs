@@ -63,7 +63,7 @@ impl<'s> Search<'s> {
         let kinds: &[AngularKind] = match &self.wish.kind {
             Some(kind) => std::slice::from_ref(kind),
             None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
-            None => &[AngularKind::Zernike, AngularKind::Hemispherical, AngularKind::Splines],
+            None => &[AngularKind::Zernike, AngularKind::Spherical, AngularKind::Splines],
         };
         for kind in kinds {
             self.rising(&self.angular(*kind), position)?;
@@ -338,7 +338,7 @@ const COARSE: [(usize, usize); 2] = [(4, 8), (7, 12)];
 const SHARING: usize = 5;
 const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];
 const HEMISPHERICAL: [usize; 8] = [2, 4, 6, 8, 10, 12, 15, 18];
-const SPHERICAL: [usize; 10] = [0, 1, 2, 4, 6, 8, 10, 12, 15, 18];
+const SPHERICAL: [usize; 12] = [0, 1, 2, 4, 6, 8, 10, 12, 15, 18, 22, 26];
 const SECOND_PLANE: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 10, 12];
 /// Spans of θ, and of φ round the horizon.
 const SPLINES: [(usize, usize); 10] = [

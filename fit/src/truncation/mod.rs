@@ -131,6 +131,7 @@ fn finer(fit: &Fit, samples: &[Sample]) -> Option<BasisSpec> {
     let degree = match own.angular {
         Angular::Zernike { degree, .. } | Angular::EvenHarmonics { degree } => degree,
         Angular::Hemispherical { degree } => degree + 2,
+        Angular::Spherical { degree } if !fit.region().chart.is_whole_sphere() => degree + 2,
         Angular::Splines { .. } => OF_SPLINES,
         Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
     };

@@ -33,7 +33,7 @@ pub(crate) struct FitArgs {
     /// penalty unless one is given. Default: as for --basis.
     #[arg(long, value_name = "N")]
     pub(crate) angular_degree: Option<usize>,
-    /// Power of the degree that is held against rough fields, 0 to 8 (of splines 1 or 2); 0 for
+    /// Power of the degree that is held against rough fields, 0 to 18 (of splines 1 or 2); 0 for
     /// plain least squares.
     #[arg(long, value_name = "POWER", allow_negative_numbers = true)]
     pub(crate) penalty_power: Option<f64>,
