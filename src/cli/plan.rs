@@ -47,6 +47,10 @@ fn as_text(
         row("targets", prediction.targets.to_string()),
         row("readings", prediction.readings.to_string()),
     ];
+    if let Some(step) = setup.sequence.steps.first() {
+        let gain = setup.rig.detector.gains.get(usize::from(step.gain));
+        rows.extend(gain.map(|gain| row("gain", gain.name.clone())));
+    }
     if let Some(sweeps) = sweeps(setup) {
         rows.push(row("sweeps", sweeps));
     }

@@ -1,5 +1,6 @@
-//! `[expect]`: what a person expects to measure, for predictions alone. It changes no reading and
-//! no fit, and is no part of the plan's hash.
+//! `[expect]`: what a person expects to measure, for predictions, and for the gain range where the plan
+//! asks for the one that suits it. It changes no other reading and no fit, and is itself no part of
+//! the plan's hash.
 
 use spanned_toml::{Bounds, Problem, Table};
 
@@ -10,6 +11,11 @@ const LEVEL: Bounds = Bounds::positive_up_to(1e12);
 const BEAM_DEG: Bounds = Bounds::between(0.1, 179.0);
 const FEATURE_DEG: Bounds = Bounds::between(0.1, 180.0);
 const FEATURE_MM: Bounds = Bounds::between(0.001, 10_000.0);
+
+/// As the gain range of a plan that names none itself: the one that suits what is expected.
+const EXPECTED: &str = "expected";
+/// What is expected fills this part of a range at most: a level stated by a person is no maximum.
+const FILLED_MOST: f64 = 0.6;
 
 /// What is expected; `None` where nothing is said.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -53,6 +59,54 @@ impl Expect {
 }
 
 impl Plan {
+    /// The gain range of all readings: the one named, the rig's first if none is; of `"expected"` the
+    /// most sensitive one that the expected level fills to 60 % at most.
+    pub(super) fn gain_on(&self, rig: &Rig) -> Result<u8, Problem> {
+        let Some(name) = &self.gain else { return Ok(0) };
+        if let Some(gain) = rig.detector.gain_index(name) {
+            return Ok(gain);
+        }
+        if name == EXPECTED {
+            return self.expected_gain(rig);
+        }
+        let names: Vec<String> =
+            rig.detector.gains.iter().map(|gain| format!("\"{}\"", gain.name)).collect();
+        Err(self.problem(
+            "dwell",
+            "gain",
+            &format!("{} has no gain range \"{name}\"", rig.name),
+            &format!("one of {}, or \"{EXPECTED}\"", names.join(", ")),
+            "name one of the rig's gain ranges, or leave the key out for the first",
+        ))
+    }
+
+    fn expected_gain(&self, rig: &Rig) -> Result<u8, Problem> {
+        self.check_expected(rig)?;
+        let refused = |what: &str, expected: &str, help: &str| {
+            Err(self.problem("dwell", "gain", what, expected, help))
+        };
+        let Some((_, level)) = self.expect.level else {
+            return refused(
+                "nothing says what level is expected",
+                "a level in [expect]",
+                &format!("state {} there, or name a gain range", {
+                    rig.detector.quantity.radiance_column()
+                }),
+            );
+        };
+        let bears = |gain: &u8| FILLED_MOST * rig.detector.saturation_radiance(*gain) >= level;
+        let ranges = (0..u8::try_from(rig.detector.gains.len()).unwrap_or(u8::MAX)).filter(bears);
+        let saturation = |gain: &u8| rig.detector.saturation_radiance(*gain);
+        match ranges.min_by(|a, b| saturation(a).total_cmp(&saturation(b))) {
+            Some(gain) => Ok(gain),
+            None => refused(
+                &format!("the expected level of {level} fills every gain range beyond 60 %"),
+                "a level that some range bears",
+                "correct the level in [expect], dim the source, or name a gain range",
+            ),
+        }
+    }
+
     /// A level in another unit than the detector's says nothing.
     pub(super) fn check_expected(&self, rig: &Rig) -> Result<(), Problem> {
         let own = rig.detector.quantity;

@@ -2,7 +2,7 @@
 
 use spanned_toml::{Document, Problem, Source};
 
-use super::{Expect, Plan};
+use super::{Change, Expect, Plan};
 use crate::rig::{Quantity, Rig};
 
 fn read(expect: &str) -> Result<Plan, Problem> {
@@ -56,5 +56,25 @@ fn what_cannot_be_is_refused_at_its_key() {
     let other = read("[expect]\nluminance_cd_per_m2 = 100\n").unwrap();
     let problem = other.lay_out(&Rig::built_in().unwrap(), None).unwrap_err();
     assert_eq!(problem.key(), "expect.luminance_cd_per_m2", "{problem}");
+    assert!(problem.to_string().contains("radiance_w_per_m2_sr"), "{problem}");
+}
+
+#[test]
+fn the_gain_that_suits_it_is_the_most_sensitive_that_bears_it() {
+    let rig = Rig::built_in().unwrap();
+    let asked = |expect: &str| {
+        let plan = read(expect).unwrap();
+        let plan = plan.changed(&[Change::set("dwell", "gain", "\"expected\"")]).unwrap();
+        plan.lay_out(&rig, None).map(|sequence| sequence.steps[0].gain)
+    };
+    let level = |radiance: f64| format!("[expect]\nradiance_w_per_m2_sr = {radiance}\n");
+    for gain in 0..u8::try_from(rig.detector.gains.len()).unwrap() {
+        let most = 0.6 * rig.detector.saturation_radiance(gain);
+        assert_eq!(asked(&level(0.999 * most)).unwrap(), gain, "{most}");
+        let next = asked(&level(1.001 * most));
+        assert!(next.as_ref().map_or(gain == 0, |next| *next < gain), "{next:?}");
+    }
+    let problem = asked("").unwrap_err();
+    assert_eq!(problem.key(), "dwell.gain", "{problem}");
     assert!(problem.to_string().contains("radiance_w_per_m2_sr"), "{problem}");
 }

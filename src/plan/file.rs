@@ -290,7 +290,8 @@ pub(super) fn read_turn_step(table: &Table<'_>, key: &str) -> Result<f64, Proble
     ))
 }
 
-/// `[dwell]`: `dwell_ms`; `gain`, a gain range's name (default: the rig's first).
+/// `[dwell]`: `dwell_ms`; `gain`, a gain range's name (default: the rig's first), or "expected"
+/// for the one that suits the level in `[expect]`.
 fn read_dwell(table: Table<'_>) -> Result<(Duration, Option<String>), Problem> {
     let dwell = millis(table.required_number("dwell_ms", DWELL_MS)?);
     let gain = table.text("gain")?.map(str::to_owned);

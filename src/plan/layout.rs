@@ -69,21 +69,6 @@ impl Plan {
         Ok(Sequence { targets, steps, prediction, reference })
     }
 
-    pub(super) fn gain_on(&self, rig: &Rig) -> Result<u8, Problem> {
-        let Some(name) = &self.gain else { return Ok(0) };
-        rig.detector.gain_index(name).ok_or_else(|| {
-            let names: Vec<String> =
-                rig.detector.gains.iter().map(|gain| format!("\"{}\"", gain.name)).collect();
-            self.problem(
-                "dwell",
-                "gain",
-                &format!("{} has no gain range \"{name}\"", rig.name),
-                &format!("one of {}", names.join(", ")),
-                "name one of the rig's gain ranges, or leave the key out for the first",
-            )
-        })
-    }
-
     /// A dwell must hold a whole ADC reading.
     fn check_dwells(&self, rig: &Rig) -> Result<(), Problem> {
         let rate_hz = rig.detector.adc.rate_hz;

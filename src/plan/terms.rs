@@ -31,7 +31,7 @@ pub struct Plan {
     pub repeat: u32,
     /// `dwell.dwell_ms`: the integration at a target.
     pub dwell: Duration,
-    /// `dwell.gain`: a gain range's name; the rig's first if absent.
+    /// `dwell.gain`: a gain range's name, or "expected"; the rig's first if absent.
     pub gain: Option<String>,
     /// `[dark]`.
     pub dark: Dark,

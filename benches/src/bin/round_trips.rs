@@ -17,7 +17,7 @@ use benches::{
 };
 use clap::Parser;
 use firmware_protocol::{Reply, Request};
-use gonio::device::{DeviceEvent, Link, Native, SerialSettings, open_serial};
+use gonio::device::{Controller, DeviceEvent, Link, SerialSettings, open_serial};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 
 /// The last is the fastest that a simulated wire goes: hardly a wire at all.
@@ -152,7 +152,7 @@ async fn ask(
         boot_wait: Duration::ZERO,
     };
     let (stream, passed) = Counted::new(open_serial(&settings).await?);
-    let (mut native, _) = Native::connect(Link::new("tty", stream), 1, baud, PATIENCE).await?;
+    let (mut native, _) = Controller::connect(Link::new("tty", stream), 1, baud, PATIENCE).await?;
     rounds(&mut native, window, questions / 10).await?;
     let before = passed.passed();
     let began = Instant::now();
@@ -171,7 +171,11 @@ fn per_question(passed: &Bytes, before: (u64, u64), questions: u32) -> (f64, f64
     (each(written, before.1), each(read, before.0))
 }
 
-async fn rounds(native: &mut Native, window: usize, questions: u32) -> Result<Spread, Unmeasured> {
+async fn rounds(
+    native: &mut Controller,
+    window: usize,
+    questions: u32,
+) -> Result<Spread, Unmeasured> {
     let mut left = questions;
     for _ in 0..window.min(questions as usize) {
         native.submit(Request::ReadStatus);
