@@ -10,6 +10,8 @@ mod homing;
 mod lines;
 mod motion;
 mod reports;
+#[cfg(test)]
+mod tests;
 mod words;
 
 use std::collections::VecDeque;
