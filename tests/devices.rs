@@ -3,6 +3,10 @@
 
 mod bench;
 
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
 use bench::Bench;
 
 const DEVICES: &str = "\
@@ -87,6 +91,53 @@ fn at_ports() -> Bench {
             &format!("driver = \"keithley-6485\"\n{}", port("board-photometer")),
         );
     bench.having("rig.toml", real).with("plan.toml", "scene = \"scene.toml\"\n", "")
+}
+
+#[test]
+fn a_run_that_is_interrupted_stops_its_devices_and_is_carried_on() {
+    // Fast axes, so that homing does not take longer than the test.
+    let devices = on_devices()
+        .with("rig.toml", "speed_deg_per_s = 60", "speed_deg_per_s = 1000")
+        .with("rig.toml", "acceleration_deg_per_s2 = 120", "acceleration_deg_per_s2 = 20000")
+        .with("rig.toml", "speed_mm_per_s = 100", "speed_mm_per_s = 1000")
+        .with("rig.toml", "acceleration_mm_per_s2 = 500", "acceleration_mm_per_s2 = 20000");
+    let mut command = devices.command(&["run", "plan.toml", "--realtime", "--out", "run"]);
+    let mut run = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let began = Instant::now();
+    // Homed, and in the midst of it.
+    while !devices.path("run/run.sqlite").exists() {
+        assert!(began.elapsed() < Duration::from_secs(30), "it never began");
+        sleep(Duration::from_millis(50));
+    }
+    sleep(Duration::from_secs(8));
+    bench::signal(&run, "INT");
+    let asked = Instant::now();
+    while run.try_wait().unwrap().is_none() {
+        if asked.elapsed() > Duration::from_secs(20) {
+            run.kill().unwrap();
+            panic!("it does not stop");
+        }
+        sleep(Duration::from_millis(20));
+    }
+    let said = bench::Said::from_output("gonio run", &run.wait_with_output().unwrap());
+    assert_eq!(said.code, Some(1), "{said}");
+    said.says(&["gonio resume"]);
+
+    devices.gonio(&["resume", "run"]).well();
+    let resumed = table(&devices, "run/samples.csv");
+    devices.gonio(&["run", "plan.toml", "--out", "whole"]).well();
+    let whole = table(&devices, "whole/samples.csv");
+    assert_eq!(resumed.of("index"), whole.of("index"), "each target once");
+    let radiance = "radiance_w_per_m2_sr";
+    for (a, b) in resumed.of(radiance).into_iter().zip(whole.of(radiance)) {
+        assert!((a / b - 1.0).abs() < 2e-3, "{a} beside {b}");
+    }
+    let sessions = table(&devices, "run/readings.csv").of("session");
+    assert!(sessions.contains(&0.0) && sessions.contains(&1.0), "two sessions");
+    // The meter's own clock beside the host's; grbl has none.
+    let readings = table(&devices, "run/readings.csv");
+    let meter_s = readings.of("photometer_time_s");
+    assert!(meter_s.windows(2).all(|pair| (pair[0] - pair[1]).abs() > 0.01));
 }
 
 #[test]
