@@ -11,12 +11,20 @@ use crate::SimulatedBoard;
 impl GrblTwin {
     /// Reads and carries out lines, as long as none has to wait.
     pub(super) fn read_lines(&mut self, board: &mut SimulatedBoard, now: Instant) {
-        while self.can_read(now) {
-            let Some(end) = self.received.iter().position(|byte| *byte == b'\n' || *byte == b'\r')
-            else {
+        while self.busy_until <= now && self.would_read() {
+            while !self.has_line {
+                match self.received.pop_front() {
+                    Some(b'\n' | b'\r') => self.has_line = true,
+                    Some(byte) if self.line.len() <= LINE_BYTES_MAX => self.line.push(byte),
+                    Some(_) => {}
+                    None => return,
+                }
+            }
+            if self.is_full() {
                 return;
-            };
-            let bytes: Vec<u8> = self.received.drain(..=end).collect();
+            }
+            self.has_line = false;
+            let bytes = std::mem::take(&mut self.line);
             let text = String::from_utf8_lossy(&bytes).trim().to_owned();
             self.busy_until = Instant::from_micros(now.micros() + PARSE_US);
             let answer = if text.len() > LINE_BYTES_MAX {
@@ -34,11 +42,17 @@ impl GrblTwin {
         }
     }
 
-    fn can_read(&self, now: Instant) -> bool {
+    fn is_full(&self) -> bool {
+        self.blocks.len() >= PLANNER_BLOCKS
+    }
+
+    /// Whether it would take bytes out of its buffer, or carry out the line that it took. A line
+    /// that waits for room among the blocks has left the buffer; no byte behind it has.
+    pub(super) fn would_read(&self) -> bool {
         let is_stuck = matches!(self.state, State::Alarm(Some(_)));
-        let is_full = self.blocks.len() >= PLANNER_BLOCKS;
-        let is_free = self.boots_at.is_none() && self.busy_until <= now;
-        is_free && !is_stuck && !is_full && self.waiting.is_none() && self.homing.is_none()
+        let is_free = self.boots_at.is_none() && self.waiting.is_none() && self.homing.is_none();
+        let has_work = if self.has_line { !self.is_full() } else { !self.received.is_empty() };
+        is_free && !is_stuck && has_work
     }
 
     /// A line that begins with `$`. Whether it is answered now.

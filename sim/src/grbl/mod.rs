@@ -101,6 +101,9 @@ pub struct GrblTwin {
     /// Where the last line queued will end.
     planned: Vec<f64>,
     received: VecDeque<u8>,
+    /// The line that was taken out of the buffer, and whether its end was.
+    line: Vec<u8>,
+    has_line: bool,
     waiting: Option<Waiting>,
     /// When the next byte can be looked at.
     busy_until: Instant,
@@ -133,6 +136,8 @@ impl GrblTwin {
             blocks: VecDeque::new(),
             planned: rest,
             received: VecDeque::new(),
+            line: Vec::new(),
+            has_line: false,
             waiting: None,
             busy_until: Instant::ZERO,
             homing: None,
@@ -227,6 +232,8 @@ impl GrblTwin {
         self.blocks.clear();
         self.planned = self.position.clone();
         self.received.clear();
+        self.line.clear();
+        self.has_line = false;
         self.waiting = None;
         (self.motion, self.modes, self.outputs) = (0, Modes::default(), Outputs::default());
         self.state = match self.state {
@@ -361,11 +368,7 @@ impl Twin for GrblTwin {
     }
 
     fn poll_timeout(&self, board: &SimulatedBoard) -> Option<Instant> {
-        let has_line = self.received.iter().any(|byte| matches!(byte, b'\n' | b'\r'));
-        let could_read = self.waiting.is_none() && self.homing.is_none() && self.boots_at.is_none();
-        let is_full = self.blocks.len() >= PLANNER_BLOCKS;
-        let is_stuck = matches!(self.state, State::Alarm(Some(_)));
-        let reads = (has_line && could_read && !is_full && !is_stuck).then_some(self.busy_until);
+        let reads = self.would_read().then_some(self.busy_until);
         let ends = self.leg.as_ref().filter(|_| self.state == State::Run).map(Leg::ends_at);
         let pause = match self.waiting {
             Some(Waiting::Pause { until, .. }) => Some(until),
