@@ -1,5 +1,7 @@
 //! One table of a document: values by key, checked as they are read.
 
+mod lists;
+
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
@@ -130,30 +132,6 @@ impl<'d> Table<'d> {
             .map(|item| self.read_number(key, item, bounds))
             .collect::<Result<_, _>>()
             .map(Some)
-    }
-
-    /// A list of points, each a list of numbers inside `bounds`: as many as the ranges allow.
-    pub fn points(
-        &self,
-        key: &str,
-        bounds: Bounds,
-        count: RangeInclusive<usize>,
-        dimensions: RangeInclusive<usize>,
-    ) -> Result<Option<Vec<Vec<f64>>>, Problem> {
-        let Some(value) = self.look_up(key) else { return Ok(None) };
-        let each = format!("{} to {} numbers, each {bounds}", dimensions.start(), dimensions.end());
-        let expected = format!("a list of {} to {} lists of {each}", count.start(), count.end());
-        let list = match &value.kind {
-            Kind::Array(list) if count.contains(&list.len()) => list,
-            _ => return Err(self.unexpected(key, value, &expected)),
-        };
-        let point = |item: &Value| match &item.kind {
-            Kind::Array(numbers) if dimensions.contains(&numbers.len()) => {
-                numbers.iter().map(|number| self.read_number(key, number, bounds)).collect()
-            }
-            _ => Err(self.unexpected(key, item, &format!("a list of {each}"))),
-        };
-        list.iter().map(point).collect::<Result<_, _>>().map(Some)
     }
 
     /// `[low, high]` with `low < high`, both inside `bounds`.
