@@ -68,6 +68,11 @@ impl Bench {
         &self.board
     }
 
+    /// The same, to put devices around it.
+    pub const fn board_mut(&mut self) -> &mut SimulatedBoard {
+        &mut self.board
+    }
+
     /// A host puts bytes on a line at `now`.
     pub fn send(&mut self, now: Instant, line: usize, bytes: &[u8]) {
         let Some(line) = self.lines.get_mut(line) else { return };
@@ -161,4 +166,4 @@ impl core::fmt::Debug for Bench {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

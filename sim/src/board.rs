@@ -174,6 +174,11 @@ impl SimulatedBoard {
         passing::readings(light_a, readings, drawn.averages())
     }
 
+    /// What a detector that is looked at now shows, amperes: the light's part of its current.
+    pub(crate) fn light_now_a(&self, now: Instant) -> f64 {
+        if self.shutter == Shutter::Closed { 0.0 } else { self.light_a(now) }
+    }
+
     /// At a moment, amperes.
     fn light_a(&self, now: Instant) -> f64 {
         let radiance = self.compiled.optics.radiance(&self.detector_axis(now));

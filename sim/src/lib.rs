@@ -20,10 +20,10 @@ mod dynamixel;
 mod effect;
 mod field;
 mod grbl;
-mod keithley;
 mod levels;
 mod light;
 mod mechanics;
+mod meter;
 mod nominal;
 mod optics;
 mod pty;
@@ -43,14 +43,14 @@ pub use bench::Bench;
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
 pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
-pub use dynamixel::{DynamixelBus, ServoFault, ServoSetting};
+pub use dynamixel::{DynamixelBus, ServoFault, ServoLoad, ServoSetting};
 pub use effect::{Bound, BoundUnit, EffectRow};
 pub use field::Ray;
 pub use grbl::GrblTwin;
-pub use keithley::KeithleyTwin;
 pub use mechanics::{
     AxisFlaws, EncoderError, Misalignment, MissedSteps, Ringing, SeenRay, Uncertain,
 };
+pub use meter::{MeterMake, MeterTwin};
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use optics::Axis;
 pub use pty::Pty;

@@ -13,7 +13,7 @@ use super::progress::ProgressLine;
 use super::session::draw_session;
 use super::setup::{Setup, Stage};
 use super::simulated::{SimulatedDevice, SimulatedDevices, StopSignals};
-use crate::device::{Openers, SerialSettings, serial_opener};
+use crate::device::{Openers, SerialSettings, port_opener, serial_opener};
 use crate::journal::{Journal, JournalError, Writer};
 use crate::rig::{Link, Port, Rig};
 use crate::run::{Ended, Happening, Job, Outcome, OwnerHandle, Source, StartError, Wish, own};
@@ -86,7 +86,7 @@ pub(crate) fn openers_of(stage: Option<&Stage>, rig: &Rig) -> Openers {
             .into()
         }
         (None, Link::Devices, Some(devices)) => {
-            Openers(devices.ports().map(|port| serial_opener(settings(port))).collect())
+            Openers(devices.ports().map(|port| port_opener(settings(port))).collect())
         }
         (None, Link::Devices, None) => unreachable!("the rig reader demands devices"),
         (None, Link::Simulated { .. }, _) => unreachable!("a simulated rig has a stage"),

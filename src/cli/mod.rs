@@ -43,6 +43,7 @@ mod study;
 mod summary;
 mod target;
 mod text;
+mod twins;
 
 use std::process::ExitCode;
 

@@ -2,6 +2,7 @@
 //! anybody (`gonio sim`).
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -17,8 +18,9 @@ use super::inputs::{BUILT_IN, Inputs};
 use super::output::{note, say};
 use super::session::draw_session;
 use super::setup::{Stage, no_scene, rig_at, stage_at};
+use super::twins;
 use crate::device::{Link, Opener, Openers, opener};
-use crate::rig::{AXES, AxesDriver, AxesLink, Devices, PhotometerDriver};
+use crate::rig::Devices;
 
 /// Bytes that wait between host and wire: as much as a serial port's driver buffers.
 const STREAM_BYTES: usize = 4096;
@@ -69,7 +71,7 @@ impl SimulatedDevices {
     /// Switches them on around one board, as a task of the current runtime.
     pub(crate) fn switch_on(stage: &Stage, devices: &Devices) -> Self {
         let (streams, mut waiting) = mpsc::unbounded_channel::<(usize, DuplexStream)>();
-        let mut bench = bench(stage, devices, OWN_BOOT);
+        let mut bench = twins::bench(stage, &twins::of(devices), OWN_BOOT);
         let lines = bench.lines();
         tokio::spawn(async move {
             let boot = Instant::now();
@@ -100,81 +102,97 @@ impl SimulatedDevices {
     }
 }
 
-/// The devices of a rig file around one board, the meter as the last.
-fn bench(stage: &Stage, devices: &Devices, boot: u32) -> sim::Bench {
-    let board = sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot);
-    let nominal = board.nominal().clone();
-    let mut bench = sim::Bench::new(board);
-    for link in &devices.axes {
-        let wire = wire(stage, link.baud);
-        match &link.driver {
-            AxesDriver::Grbl { letters, .. } => {
-                let twin = sim::GrblTwin::new(&nominal, &by_letter(letters, link));
-                bench.plug(twin, wire);
-            }
-        }
-    }
-    let wire = wire(stage, devices.photometer.baud);
-    match devices.photometer.driver {
-        PhotometerDriver::Keithley6485 => bench.plug(sim::KeithleyTwin::new(), wire),
-    };
-    bench
-}
-
-/// What a grbl's axes move, in its own order: the place in the rig, and the zero in degrees or
-/// millimetres.
-fn by_letter(letters: &[char], link: &AxesLink) -> Vec<(usize, f64)> {
-    let mut axes: Vec<(char, usize, f64)> = Vec::new();
-    for ((letter, name), zero) in letters.iter().zip(&link.axes).zip(&link.zeros) {
-        let place = AXES.iter().position(|axis| axis == name).unwrap_or_default();
-        let zero = if name.is_rotary() { zero.to_degrees() } else { zero * 1e3 };
-        axes.push((*letter, place, zero));
-    }
-    axes.sort_by_key(|(letter, ..)| "XYZABCUVW".find(*letter));
-    axes.into_iter().map(|(_, place, zero)| (place, zero)).collect()
-}
-
 fn device(stage: &Stage, boot: u32) -> Device<sim::SimulatedBoard> {
     Device::new(sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot))
 }
 
-fn wire(stage: &Stage, baud: u32) -> sim::Wire {
+pub(super) fn wire(stage: &Stage, baud: u32) -> sim::Wire {
     sim::Wire::new(baud).with_faults(stage.faults, stage.seed)
 }
 
-/// `gonio sim`: serves the device on a pseudo-terminal, in real time, until it is stopped.
+/// `gonio sim`: serves the device on a pseudo-terminal, or devices of other makes on one each, in
+/// real time, until it is stopped.
 pub(crate) fn sim(args: &SimArgs) -> Outcome {
     let mut inputs = Inputs::from_disk();
     let path = args.rig.rig.clone().unwrap_or_else(|| BUILT_IN.into());
     let rig = rig_at(&mut inputs, &path)?;
     let scene = args.rig.scene.as_ref().ok_or_else(|| no_scene(&rig))?;
     let stage = stage_at(&mut inputs, scene, &rig, &args.effects.terms(args.rig.seed))?;
-    let baud = args.baud.unwrap_or_else(|| rig.link.baud());
+    let lines = twins::wanted(&args.makes, &rig);
+    let lines = lines.map(|lines| at_baud(lines, args.baud));
+    let expected = lines.as_ref().map_or(1, Vec::len);
+    if !args.pty.is_empty() && args.pty.len() != expected {
+        return Err(Failure::with_help(
+            format!("--pty: {} links for {expected} devices", args.pty.len()),
+            "give one for each device, divided by commas and in their order, or none",
+        ));
+    }
     let runtime = Pace::Real.runtime()?;
+    if let Some(lines) = lines {
+        return runtime.block_on(serve_twins(args, &stage, &lines));
+    }
+    let baud = args.baud.unwrap_or_else(|| rig.link.baud());
     runtime.block_on(serve_on_pty(args, &stage, baud))
 }
 
-async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
+fn at_baud(mut lines: Vec<twins::Line>, baud: Option<u32>) -> Vec<twins::Line> {
+    for line in &mut lines {
+        line.baud = baud.unwrap_or(line.baud);
+    }
+    lines
+}
+
+/// A pseudo-terminal; with a link to it where one is wanted.
+fn terminal(link: Option<&PathBuf>) -> Result<sim::Pty, Failure> {
     let cannot = |error: std::io::Error| {
-        let link =
-            args.pty.as_ref().map_or(String::new(), |link| format!(" at {}", link.display()));
-        Failure::start(format!("no pseudo-terminal{link}: {error}"))
+        let at = link.map_or(String::new(), |link| format!(" at {}", link.display()));
+        Failure::start(format!("no pseudo-terminal{at}: {error}"))
     };
-    let mut stop = StopSignals::new().map_err(cannot)?;
-    let pty = sim::Pty::open(args.pty.as_deref()).map_err(cannot)?;
-    let shown = args.pty.as_deref().unwrap_or(pty.path());
-    say(&format!("{}\n", shown.display()))?;
-    note(&format!("simulated rig at {baud} baud; Ctrl-C switches it off"));
-    // Whoever drove the one before must see that this is another boot: its clock began anew.
-    let mut device = device(stage, draw_session());
+    let pty = sim::Pty::open(link.map(PathBuf::as_path)).map_err(cannot)?;
+    say(&format!("{}\n", link.map_or(pty.path(), |link| link).display()))?;
+    Ok(pty)
+}
+
+fn stop_signals() -> Result<StopSignals, Failure> {
+    StopSignals::new().map_err(|error| Failure::start(format!("no signals: {error}")))
+}
+
+/// Until it is stopped, or the terminals fail.
+async fn serve_until_stopped(
+    stop: &mut StopSignals,
+    served: impl Future<Output = std::io::Result<()>>,
+) -> Outcome {
     tokio::select! {
         biased;
         () = stop.next() => Ok(ExitCode::SUCCESS),
-        served = sim::serve(pty, &mut device, Instant::now(), wire(stage, baud)) => match served {
+        served = served => match served {
             Ok(()) => Ok(ExitCode::SUCCESS),
             Err(error) => Err(Failure::midway(format!("the pseudo-terminal failed: {error}"))),
         },
     }
+}
+
+async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
+    let mut stop = stop_signals()?;
+    let pty = terminal(args.pty.first())?;
+    note(&format!("simulated rig at {baud} baud; Ctrl-C switches it off"));
+    // Whoever drove the one before must see that this is another boot: its clock began anew.
+    let mut device = device(stage, draw_session());
+    let served = sim::serve(pty, &mut device, Instant::now(), wire(stage, baud));
+    serve_until_stopped(&mut stop, served).await
+}
+
+async fn serve_twins(args: &SimArgs, stage: &Stage, lines: &[twins::Line]) -> Outcome {
+    let mut stop = stop_signals()?;
+    let mut terminals = Vec::new();
+    for (place, line) in lines.iter().enumerate() {
+        terminals.push(terminal(args.pty.get(place))?);
+        note(&format!("a simulated {} at {} baud", line.name(), line.baud));
+    }
+    note("Ctrl-C switches them off");
+    let mut bench = twins::bench(stage, lines, draw_session());
+    let served = sim::serve_bench(terminals, &mut bench, Instant::now());
+    serve_until_stopped(&mut stop, served).await
 }
 
 /// Ctrl-C and SIGTERM, counted from when this was made.

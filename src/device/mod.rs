@@ -12,9 +12,11 @@ mod axes;
 mod composed;
 mod controller;
 mod driver;
+mod dynamixel;
 mod grbl;
-mod keithley;
+mod line_ports;
 mod link;
+mod meter;
 mod native;
 mod photometer;
 mod ports;
@@ -26,9 +28,11 @@ pub use axes::{Axes, AxesCommand, AxesEvent, AxesFacts, AxisFacts, Located};
 pub use composed::Composer;
 pub use controller::{ConnectError, Controller, DeviceEvent, LinkLost};
 pub use driver::{Driver, NamedFault, Promises, Refusal, Trouble};
+pub use dynamixel::{Dynamixel, ServoAxis, ServoId, ShutterServo};
 pub use grbl::{Grbl, Greeting};
-pub use keithley::Keithley;
+pub use line_ports::port_opener;
 pub use link::{Link, Opener, Openers, Opening, opener};
+pub use meter::{Line, Meter};
 pub use photometer::{
     Exposed, Exposure, Photometer, PhotometerCommand, PhotometerEvent, PhotometerFacts,
 };

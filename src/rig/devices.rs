@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use spanned_toml::{Bounds, Problem, Table};
 
+use super::meters::PhotometerDriver;
 use super::{AXES, AxisName};
 
 /// Serial lines run between these rates, baud.
@@ -13,6 +14,15 @@ const BAUD: core::ops::RangeInclusive<i64> = 300..=12_000_000;
 const BOOT_WAIT_MS_MAX: i64 = 60_000;
 /// No axis's zero lies further from its device's than this, in the file's unit.
 const ZERO_MAX: f64 = 1e5;
+/// Further than this from its goal no axis is where it was sent, steps of a servo's encoder.
+const TOLERANCE_STEPS_MAX: i64 = 1024;
+/// A servo holds against friction and load without an integrator unless it is set to.
+const TOLERANCE_STEPS_DEFAULT: u32 = 12;
+/// A shutter turns within one turn, and by more than its tolerance.
+const SHUTTER_STEPS_MAX: i64 = 4095;
+const SHUTTER_STEPS_MIN: u32 = 200;
+/// The highest number of a servo on its bus.
+const SERVO_ID_MAX: i64 = 252;
 /// grbl knows no others.
 const LETTERS: &str = "XYZABCUVW";
 
@@ -43,6 +53,15 @@ pub struct AxesLink {
 /// A driver for axes, with what it alone needs to know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AxesDriver {
+    /// Dynamixel servos of the X series on one bus.
+    Dynamixel {
+        /// The servo of each axis, in the order of [`AxesLink::axes`].
+        ids: Vec<u8>,
+        /// The servo that holds a shutter, if one does.
+        shutter: Option<ShutterServo>,
+        /// How far from its goal one may come to rest, steps of its encoder.
+        tolerance_steps: u32,
+    },
     /// A board with grbl 1.1.
     Grbl {
         /// The board's letter for each axis, in the order of [`AxesLink::axes`].
@@ -50,6 +69,17 @@ pub enum AxesDriver {
         /// The output that closes a shutter, if one does.
         shutter: Option<GrblOutput>,
     },
+}
+
+/// A servo that holds a shutter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShutterServo {
+    /// Its number on the bus.
+    pub id: u8,
+    /// Where it stands when light reaches the detector, steps of its encoder.
+    pub open_steps: i32,
+    /// Where it stands when none does, steps of its encoder.
+    pub closed_steps: i32,
 }
 
 /// A switched output of a grbl board.
@@ -72,13 +102,6 @@ pub struct PhotometerLink {
     pub baud: u32,
 }
 
-/// A driver for a meter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PhotometerDriver {
-    /// A Keithley 6485 or 6487 picoammeter over RS-232.
-    Keithley6485,
-}
-
 /// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Port {
@@ -95,7 +118,11 @@ pub struct Port {
 impl Devices {
     /// Reads `[[axes_link]]` and `[photometer]`; `None` where the file has neither. `has_ports`
     /// is false on a simulated rig, which needs none.
-    pub(super) fn read(root: &Table<'_>, has_ports: bool) -> Result<Option<Self>, Problem> {
+    pub(super) fn read(
+        root: &Table<'_>,
+        has_ports: bool,
+        gains: usize,
+    ) -> Result<Option<Self>, Problem> {
         let tables = root.tables("axes_link")?;
         let meter = root.table("photometer")?;
         if tables.is_empty() && meter.is_none() {
@@ -114,7 +141,7 @@ impl Devices {
         let meter = meter.ok_or_else(|| {
             root.missing("photometer", "a table [photometer] beside [[axes_link]]")
         })?;
-        let photometer = read_photometer(meter, has_ports, &mut ports)?;
+        let photometer = read_photometer(meter, has_ports, gains, &mut ports)?;
         Ok(Some(Self { axes, photometer }))
     }
 
@@ -133,35 +160,105 @@ impl Devices {
     }
 }
 
+#[derive(Debug, Clone, Copy)]
+enum AxesKind {
+    Dynamixel,
+    Grbl,
+}
+
 /// The keys of `[[axes_link]]`.
 ///
-/// `driver` "grbl" · `port`, `baud`, `reset_on_open`, `boot_wait_ms` as in `[link]` · `letters`
-/// (grbl): the board's letter of each axis that it moves, `{ theta = "X", phi = "Y" }` ·
-/// `zero_deg`, `zero_mm`: where the axes' zeros lie, counted from the device's own,
-/// `{ theta = -95 }`, 0 where absent · `shutter` (grbl) flood or spindle: the output that closes
-/// one.
+/// `driver` "grbl" or "dynamixel" · `port`, `baud`, `reset_on_open`, `boot_wait_ms` as in `[link]`
+/// · `letters` (grbl): the board's letter of each axis that it moves, `{ theta = "X", phi = "Y" }`
+/// · `ids` (dynamixel): the servo of each axis, `{ theta = 1, phi = 2 }` · `tolerance_steps`
+/// (dynamixel, default 12): how far from its goal a servo may come to rest · `zero_deg`,
+/// `zero_mm`: where the axes' zeros lie, counted from the device's own, `{ theta = -95 }`, 0
+/// where absent · `shutter` (grbl) flood or spindle: the output that closes one · `shutter`
+/// (dynamixel): the servo that holds one, `{ id = 7, open_steps = 1024, closed_steps = 2048 }`.
 fn read_axes_link(
     table: Table<'_>,
     has_ports: bool,
     ports: &mut HashSet<String>,
     driven: &mut HashSet<AxisName>,
 ) -> Result<AxesLink, Problem> {
-    table.required_choice("driver", &[("grbl", ())])?;
-    let (axes, letters) = read_letters(&table)?;
+    let kinds = [("grbl", AxesKind::Grbl), ("dynamixel", AxesKind::Dynamixel)];
+    let kind = table.required_choice("driver", &kinds)?;
+    let (axes, driver, key, baud) = match kind {
+        AxesKind::Grbl => {
+            let (axes, letters) = read_letters(&table)?;
+            let outputs = [("flood", GrblOutput::Flood), ("spindle", GrblOutput::Spindle)];
+            let shutter = table.choice("shutter", &outputs)?;
+            (axes, AxesDriver::Grbl { letters, shutter }, "letters", 115_200)
+        }
+        AxesKind::Dynamixel => {
+            let (axes, ids) = read_ids(&table)?;
+            let tolerance = table.integer("tolerance_steps", 1..=TOLERANCE_STEPS_MAX)?;
+            let tolerance_steps = tolerance.and_then(|steps| u32::try_from(steps).ok());
+            let tolerance_steps = tolerance_steps.unwrap_or(TOLERANCE_STEPS_DEFAULT);
+            let shutter = table.table("shutter")?.map(|table| read_shutter(table, &ids));
+            let shutter = shutter.transpose()?;
+            (axes, AxesDriver::Dynamixel { ids, shutter, tolerance_steps }, "ids", 57_600)
+        }
+    };
     if let Some(twice) = axes.iter().find(|axis| !driven.insert(**axis)) {
         return Err(table.problem(
-            "letters",
+            key,
             &format!("{} is moved by another [[axes_link]] already", twice.name()),
             "each axis in one [[axes_link]]",
             "remove it from one of the two",
         ));
     }
-    let outputs = [("flood", GrblOutput::Flood), ("spindle", GrblOutput::Spindle)];
-    let driver = AxesDriver::Grbl { letters, shutter: table.choice("shutter", &outputs)? };
-    let (port, baud) = read_port(&table, 115_200, has_ports, ports)?;
+    let (port, baud) = read_port(&table, baud, has_ports, ports)?;
     let link = AxesLink { driver, port, baud, zeros: read_zeros(&table, &axes)?, axes };
     table.finish()?;
     Ok(link)
+}
+
+/// `shutter` of servos: `id` · `open_steps`, `closed_steps`.
+fn read_shutter(table: Table<'_>, ids: &[u8]) -> Result<ShutterServo, Problem> {
+    let id = table.required_integer("id", 0..=SERVO_ID_MAX)?;
+    let id = u8::try_from(id).unwrap_or_default();
+    if ids.contains(&id) {
+        let (what, help) = (format!("servo {id} moves an axis"), "give the shutter's own servo");
+        return Err(table.problem("id", &what, "a servo of its own", help));
+    }
+    let steps = |key: &str| {
+        let steps = table.required_integer(key, 0..=SHUTTER_STEPS_MAX)?;
+        Ok(i32::try_from(steps).unwrap_or_default())
+    };
+    let shutter =
+        ShutterServo { id, open_steps: steps("open_steps")?, closed_steps: steps("closed_steps")? };
+    if shutter.open_steps.abs_diff(shutter.closed_steps) < SHUTTER_STEPS_MIN {
+        return Err(table.problem(
+            "closed_steps",
+            &format!("{} steps, beside {} open", shutter.closed_steps, shutter.open_steps),
+            &format!("at least {SHUTTER_STEPS_MIN} steps apart"),
+            "turn the servo by hand, and read its positions with `gonio ports --probe`",
+        ));
+    }
+    table.finish()?;
+    Ok(shutter)
+}
+
+fn read_ids(table: &Table<'_>) -> Result<(Vec<AxisName>, Vec<u8>), Problem> {
+    let expected = "the servos' numbers by axis, as { theta = 1, phi = 2 }";
+    let map = table.table("ids")?.ok_or_else(|| table.missing("ids", expected))?;
+    let (mut axes, mut ids) = (Vec::new(), Vec::new());
+    for axis in AXES {
+        let Some(id) = map.integer(axis.name(), 0..=SERVO_ID_MAX)? else { continue };
+        let id = u8::try_from(id).unwrap_or_default();
+        if ids.contains(&id) {
+            let what = format!("servo {id} moves another axis already");
+            return Err(map.problem(axis.name(), &what, "a servo for each axis", expected));
+        }
+        axes.push(axis);
+        ids.push(id);
+    }
+    if axes.is_empty() {
+        return Err(table.problem("ids", "no axis", expected, "list the axes that they move"));
+    }
+    map.finish()?;
+    Ok((axes, ids))
 }
 
 fn read_letters(table: &Table<'_>) -> Result<(Vec<AxisName>, Vec<char>), Problem> {
@@ -205,16 +302,16 @@ fn read_zeros(table: &Table<'_>, axes: &[AxisName]) -> Result<Vec<f64>, Problem>
     Ok(zeros)
 }
 
-/// The keys of `[photometer]`: `driver` "keithley-6485" · `port`, `baud`, `reset_on_open`,
-/// `boot_wait_ms` as in `[link]`.
+/// The keys of `[photometer]`: `driver` and those that go with it, see [`PhotometerDriver`] ·
+/// `port`, `baud`, `reset_on_open`, `boot_wait_ms` as in `[link]`.
 fn read_photometer(
     table: Table<'_>,
     has_ports: bool,
+    gains: usize,
     ports: &mut HashSet<String>,
 ) -> Result<PhotometerLink, Problem> {
-    let drivers = [("keithley-6485", PhotometerDriver::Keithley6485)];
-    let driver = table.required_choice("driver", &drivers)?;
-    let (port, baud) = read_port(&table, 9_600, has_ports, ports)?;
+    let (driver, baud) = PhotometerDriver::read(&table, gains)?;
+    let (port, baud) = read_port(&table, baud, has_ports, ports)?;
     table.finish()?;
     Ok(PhotometerLink { driver, port, baud })
 }

@@ -46,7 +46,7 @@ impl Rig {
         let detector = read_detector(root.required_table("detector")?)?;
         let link = Link::read(root.required_table("link")?)?;
         let is_simulated = matches!(link, Link::Simulated { .. });
-        let devices = Devices::read(&root, !is_simulated)?;
+        let devices = Devices::read(&root, !is_simulated, detector.gains.len())?;
         check_devices(&root, &link, devices.as_ref())?;
         if is_simulated {
             root.leave("simulated");

@@ -14,6 +14,7 @@ mod file;
 mod file_tests;
 mod kinematics;
 mod link;
+mod meters;
 mod motion;
 mod pose;
 mod reading;
@@ -21,11 +22,12 @@ mod reading;
 pub use alignment::{Alignment, Misalignment};
 pub use axis::{Approach, Axis, LimitError, Readback};
 pub use detector::{Adc, Detector, Gain, ModelledVariance, Quantity};
-pub use devices::{
-    AxesDriver, AxesLink, Devices, GrblOutput, PhotometerDriver, PhotometerLink, Port,
-};
+pub use devices::{AxesDriver, AxesLink, Devices, GrblOutput, PhotometerLink, Port, ShutterServo};
 pub use kinematics::{Route, forward, solutions};
 pub use link::Link;
+pub use meters::{
+    Filter, Measures, Newport1830, PhotometerDriver, Picoammeter, PowerMeter, ScpiTable,
+};
 pub use motion::{Flight, comes_to_rest, set_out};
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
 pub use reading::{DeviceTimes, Latched, Reading, ReadingKind};

@@ -8,7 +8,7 @@ use crate::{Emitter, Nominal, NominalAxis, NominalDetector, NominalGain, Quantit
 use crate::{Scene, Shape, Simulated, Terms, compile};
 
 /// A rig whose θ moves 1000 counts a degree, over a patch of 40 W·m⁻²·sr⁻¹.
-fn board() -> SimulatedBoard {
+pub(crate) fn board() -> SimulatedBoard {
     let axis = |channel| NominalAxis {
         channel,
         counts_per_unit: 1000.0,
@@ -41,7 +41,9 @@ fn board() -> SimulatedBoard {
     };
     let patch = Emitter::lambertian(Shape::rectangle(0.0, 0.0, 0.04, 0.04), 40.0);
     let scene = Scene::new(Quantity::Radiance).with(patch).unwrap();
-    let compiled = compile(scene, nominal, Simulated::default(), &Terms::seeded(1)).unwrap();
+    // At boot it looks at the middle of the patch.
+    let simulated = Simulated { start: [Some(0.5); 4], ..Simulated::default() };
+    let compiled = compile(scene, nominal, simulated, &Terms::seeded(1)).unwrap();
     SimulatedBoard::new(Arc::new(compiled), 0)
 }
 

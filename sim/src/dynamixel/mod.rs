@@ -14,8 +14,8 @@ use std::collections::VecDeque;
 use firmware_protocol::{Board as _, BoardFault, Instant};
 
 use crate::{SimulatedBoard, Twin};
-pub use servo::ServoSetting;
 use servo::{CRC_ERROR, INSTRUCTION_ERROR, OVERHEATING, OVERLOAD, Servo};
+pub use servo::{ServoLoad, ServoSetting};
 use wire::{BROADCAST, Ear, Received, status, status_together};
 
 /// A hardware error that a servo raises by itself.
@@ -256,7 +256,8 @@ impl Twin for DynamixelBus {
         }
         // An axis at its end stop is more than a motor can move.
         if let Some(BoardFault::LimitSwitch(channel)) = board.fault(now) {
-            let stopped = self.servos.iter_mut().find(|servo| servo.setting.channel == channel);
+            let stopped =
+                self.servos.iter_mut().find(|servo| servo.setting.load == ServoLoad::Axis(channel));
             if let Some(servo) = stopped {
                 servo.fail(now, OVERLOAD);
             }

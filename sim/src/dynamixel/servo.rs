@@ -3,7 +3,7 @@
 
 use core::time::Duration;
 
-use firmware_protocol::{Board, Instant};
+use firmware_protocol::{Board, Instant, Shutter};
 
 use super::travel::Travel;
 use crate::SimulatedBoard;
@@ -13,8 +13,8 @@ use crate::SimulatedBoard;
 pub struct ServoSetting {
     /// Its number on the bus, 0 to 252.
     pub id: u8,
-    /// The channel of its axis on the board.
-    pub channel: u8,
+    /// What it moves.
+    pub load: ServoLoad,
     /// Where the axis's home mark stands on its encoder, steps.
     pub zero_steps: i32,
     /// What its motor follows: register 11.
@@ -23,10 +23,35 @@ pub struct ServoSetting {
     pub firmware: u8,
 }
 
+/// What a servo moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServoLoad {
+    /// The axis of this channel of the board.
+    Axis(u8),
+    /// A shutter before the detector.
+    Shutter {
+        /// Where no light passes it, steps; elsewhere all of it does.
+        closed_steps: i32,
+    },
+}
+
+/// A shutter's blade covers the beam within so many steps of where it is closed.
+const BLADE_STEPS: u32 = 100;
+
 impl ServoSetting {
+    /// Steps of an encoder's turn; in position mode a servo takes goals from 0 to one less.
+    pub const STEPS_A_TURN: i32 = 4096;
+
     /// A servo whose encoder stands in the middle of its turn at the axis's home mark.
     pub const fn new(id: u8, channel: u8) -> Self {
-        Self { id, channel, zero_steps: 2048, operating_mode: 3, firmware: 48 }
+        let load = ServoLoad::Axis(channel);
+        Self { id, load, zero_steps: 2048, operating_mode: 3, firmware: 48 }
+    }
+
+    /// A servo that holds a shutter, open at power-up.
+    pub const fn shutter(id: u8, open_steps: i32, closed_steps: i32) -> Self {
+        let load = ServoLoad::Shutter { closed_steps };
+        Self { id, load, zero_steps: open_steps, operating_mode: 3, firmware: 48 }
     }
 }
 
@@ -45,7 +70,7 @@ const ACCESS: u8 = 7;
 const MODEL: u16 = 1030;
 const EEPROM_BYTES: u16 = 64;
 const TABLE_BYTES: usize = 147;
-const STEPS_A_TURN: i32 = 4096;
+const STEPS_A_TURN: i32 = ServoSetting::STEPS_A_TURN;
 const STEPS_PER_S: f64 = 0.229 / 60.0 * 4096.0;
 const STEPS_PER_S2: f64 = 214.577 / 3600.0 * 4096.0;
 /// It says that it moves while it is faster than register 24 has it: 10 units.
@@ -119,7 +144,9 @@ pub(super) struct Servo {
 
 impl Servo {
     pub(super) fn new(setting: ServoSetting, board: &mut SimulatedBoard) -> Self {
-        board.know_home(setting.channel);
+        if let ServoLoad::Axis(channel) = setting.load {
+            board.know_home(channel);
+        }
         let mut servo = Self {
             table: Vec::new(),
             travel: Travel::rest(Instant::ZERO, 0.0),
@@ -170,7 +197,7 @@ impl Servo {
         self.table[146] = 33;
         self.booted = now;
         self.registered = None;
-        let all = board.readback(now, self.setting.channel) + self.setting.zero_steps;
+        let all = self.count(board, now) + self.setting.zero_steps;
         self.lost_steps = all.div_euclid(STEPS_A_TURN) * STEPS_A_TURN;
         let here = f64::from(all - self.setting.zero_steps);
         self.travel = Travel::rest(now, here);
@@ -237,7 +264,7 @@ impl Servo {
     fn refresh(&mut self, board: &mut SimulatedBoard, now: Instant) {
         let (_, speed) = self.travel.at(now);
         let units = speed / STEPS_PER_S;
-        let at = board.readback(now, self.setting.channel) + self.setting.zero_steps;
+        let at = self.count(board, now) + self.setting.zero_steps;
         let ms = now.since(self.booted).as_millis() % 32_768;
         #[allow(clippy::cast_possible_truncation)] // below 32768; a servo's speed
         let (tick, velocity) = (ms as u16, units.round() as i32);
@@ -337,7 +364,9 @@ impl Servo {
         }
         let (speed, acceleration) = self.speed_and_acceleration();
         self.travel = Travel::new(now, self.travel.at(now), goal, speed, acceleration);
-        board.begin_motion(now, self.setting.channel, goal);
+        if let ServoLoad::Axis(channel) = self.setting.load {
+            board.begin_motion(now, channel, goal);
+        }
         self.moves += 1;
         if let Some((moves, error)) = self.fails_in.filter(|(moves, _)| *moves <= self.moves) {
             debug_assert!(moves > 0);
@@ -380,7 +409,7 @@ impl Servo {
 
     /// Forgets whole turns: its position is within one turn from now on.
     pub(super) fn clear_turns(&mut self, board: &mut SimulatedBoard, now: Instant) {
-        let at = board.readback(now, self.setting.channel) + self.setting.zero_steps;
+        let at = self.count(board, now) + self.setting.zero_steps;
         self.lost_steps = at.div_euclid(STEPS_A_TURN) * STEPS_A_TURN;
     }
 
@@ -411,9 +440,29 @@ impl Servo {
         }
     }
 
-    /// Takes its axis to where it is.
+    /// What its encoder counts from its zero.
+    #[allow(clippy::cast_possible_truncation)] // within a few turns
+    fn count(&self, board: &mut SimulatedBoard, now: Instant) -> i32 {
+        match self.setting.load {
+            ServoLoad::Axis(channel) => board.readback(now, channel),
+            ServoLoad::Shutter { .. } => self.travel.at(now).0.round() as i32,
+        }
+    }
+
+    /// Takes what it moves to where it is.
+    #[allow(clippy::cast_possible_truncation)] // within a few turns
     pub(super) fn follow(&self, board: &mut SimulatedBoard, now: Instant) {
         let (at, _) = self.travel.at(now);
-        board.set_setpoint(now, self.setting.channel, at);
+        match self.setting.load {
+            ServoLoad::Axis(channel) => board.set_setpoint(now, channel, at),
+            ServoLoad::Shutter { closed_steps } => {
+                let steps = at.round() as i32 + self.setting.zero_steps;
+                let is_closed = steps.abs_diff(closed_steps) <= BLADE_STEPS;
+                let shutter = if is_closed { Shutter::Closed } else { Shutter::Open };
+                if board.shutter() != shutter {
+                    board.put_shutter(shutter);
+                }
+            }
+        }
     }
 }

@@ -271,12 +271,35 @@ pub(crate) struct SimArgs {
     pub(crate) rig: RigArgs,
     #[command(flatten)]
     pub(crate) effects: EffectArgs,
-    /// Make a symlink here that leads to the pseudo-terminal.
-    #[arg(long, value_name = "LINK")]
-    pub(crate) pty: Option<PathBuf>,
+    /// Speak as a device of another make, or as several that share one bench, divided by commas.
+    /// Default: the devices of the rig file, or gonio's own controller.
+    #[arg(long = "as", value_name = "MAKE", value_delimiter = ',')]
+    pub(crate) makes: Vec<Make>,
+    /// Make a symlink here that leads to the pseudo-terminal; one a device, divided by commas.
+    #[arg(long, value_name = "LINK", value_delimiter = ',')]
+    pub(crate) pty: Vec<PathBuf>,
     /// The wire's speed, bits a second. Default: what the rig's link says.
     #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     pub(crate) baud: Option<u32>,
+}
+
+/// A make of device that the simulated bench can hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Make {
+    /// Dynamixel servos of the X series on a bus.
+    Dynamixel,
+    /// A board with grbl 1.1.
+    Grbl,
+    /// A Keithley 6485 picoammeter.
+    Keithley,
+    /// gonio's own controller.
+    Native,
+    /// A Newport 1830-C power meter.
+    Newport,
+    /// The SCPI meter of the rig file; a Keithley 6485 where it has none.
+    Scpi,
+    /// A Thorlabs PM100D power meter.
+    Thorlabs,
 }
 
 #[derive(Debug, Args)]

@@ -6,12 +6,11 @@ use super::Composer;
 use super::meter::MeterPart;
 use super::part::Part;
 use crate::device::axes::Axes;
+use crate::device::dynamixel::{Dynamixel, ServoAxis, ServoId, ShutterServo};
 use crate::device::grbl::Grbl;
-use crate::device::keithley::Keithley;
+use crate::device::meter::{Line, Meter};
 use crate::device::photometer::Photometer;
-use crate::rig::{
-    AxesDriver, AxesLink, Axis, PhotometerDriver, PhotometerLink, Port, Readback, Rig,
-};
+use crate::rig::{AxesDriver, AxesLink, Axis, AxisName, PhotometerLink, Port, Readback, Rig};
 
 /// What messages call the port of a device that is simulated.
 const SIMULATED: &str = "a simulated port";
@@ -63,28 +62,53 @@ impl Composer {
     /// all of it.
     pub fn of(rig: &Rig, boot_id: u32) -> Option<Self> {
         let devices = rig.devices.as_ref()?;
-        let axes = devices.axes.iter().map(axes_driver).collect();
+        let axes = devices.axes.iter().map(|link| axes_driver(rig, link)).collect();
         let photometer = photometer_driver(rig, &devices.photometer);
         Some(Self::new(rig, &devices.axes, axes, photometer, boot_id))
     }
 }
 
-fn axes_driver(link: &AxesLink) -> Box<dyn Axes> {
+fn axes_driver(rig: &Rig, link: &AxesLink) -> Box<dyn Axes> {
+    let port = port_name(link.port.as_ref());
     match &link.driver {
-        AxesDriver::Grbl { letters, shutter } => {
-            Box::new(Grbl::new(port_name(link.port.as_ref()), letters, *shutter))
+        AxesDriver::Dynamixel { ids, shutter, tolerance_steps } => {
+            let servos = servos(rig, link, ids);
+            let shutter = shutter.and_then(|shutter| {
+                let id = ServoId::new(shutter.id)?;
+                Some(ShutterServo { id, open: shutter.open_steps, closed: shutter.closed_steps })
+            });
+            Box::new(Dynamixel::new(port, link.baud, servos, shutter, *tolerance_steps))
         }
+        AxesDriver::Grbl { letters, shutter } => Box::new(Grbl::new(port, letters, *shutter)),
     }
 }
 
+/// The servos of a bus, as the rig file has their axes: in steps from their own zeros.
+fn servos(rig: &Rig, link: &AxesLink, ids: &[u8]) -> Vec<ServoAxis> {
+    let places = link.axes.iter().zip(&link.zeros).zip(ids);
+    let servo = |((name, zero), id): ((&AxisName, &f64), &u8)| {
+        let axis = rig.axes.iter().find(|axis| axis.name == *name)?;
+        let (low, high) = axis.count_limits();
+        let zero = axis.counts(*zero);
+        Some(ServoAxis {
+            axis: name.name(),
+            id: ServoId::new(*id)?,
+            speed: axis.counts_per_s(),
+            acceleration: axis.counts_per_s2(),
+            travel: (low.saturating_add(zero), high.saturating_add(zero)),
+        })
+    };
+    places.filter_map(servo).collect()
+}
+
 fn photometer_driver(rig: &Rig, link: &PhotometerLink) -> Box<dyn Photometer> {
-    let port = port_name(link.port.as_ref());
-    let full_scales = rig.detector.gains.iter().map(|gain| gain.full_scale_a).collect();
-    match link.driver {
-        PhotometerDriver::Keithley6485 => {
-            Box::new(Keithley::new(port, link.baud, full_scales, rig.detector.adc.rate_hz))
-        }
-    }
+    let line = Line {
+        port: port_name(link.port.as_ref()).to_owned(),
+        baud: link.baud,
+        full_scales: rig.detector.gains.iter().map(|gain| gain.full_scale_a).collect(),
+        rate_hz: rig.detector.adc.rate_hz,
+    };
+    Box::new(Meter::of(&line, &link.driver))
 }
 
 fn port_name(port: Option<&Port>) -> &str {

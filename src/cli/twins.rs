@@ -1,0 +1,175 @@
+//! Simulated devices of other makes around one board: those of a rig file, or those that are asked
+//! for by name.
+
+use std::sync::Arc;
+
+use super::args::Make;
+use super::setup::Stage;
+use super::simulated::wire;
+use crate::rig::{
+    AXES, AxesDriver, AxesLink, Axis, AxisName, Devices, GrblOutput, PhotometerDriver, Rig,
+    ShutterServo,
+};
+
+/// Room between an axis's travel and its switch: five degrees or millimetres.
+const ROOM_RAD: f64 = 0.087_266;
+const ROOM_M: f64 = 0.005;
+
+/// A device and its line.
+#[derive(Debug, Clone)]
+pub(super) struct Line {
+    device: Device,
+    /// Bits a second.
+    pub(super) baud: u32,
+}
+
+#[derive(Debug, Clone)]
+enum Device {
+    Axes(AxesLink),
+    Meter(sim::MeterMake),
+}
+
+impl Line {
+    /// What it is, in words.
+    pub(super) fn name(&self) -> &'static str {
+        match &self.device {
+            Device::Axes(link) => match link.driver {
+                AxesDriver::Dynamixel { .. } => "bus of Dynamixel servos",
+                AxesDriver::Grbl { .. } => "grbl board",
+            },
+            Device::Meter(sim::MeterMake::Keithley6485) => "Keithley 6485",
+            Device::Meter(sim::MeterMake::Newport1830C) => "Newport 1830-C",
+            Device::Meter(sim::MeterMake::ThorlabsPm100) => "Thorlabs PM100D",
+        }
+    }
+
+    const fn is(&self, make: Make) -> bool {
+        match &self.device {
+            Device::Axes(link) => match link.driver {
+                AxesDriver::Dynamixel { .. } => matches!(make, Make::Dynamixel),
+                AxesDriver::Grbl { .. } => matches!(make, Make::Grbl),
+            },
+            Device::Meter(meter) => match meter {
+                sim::MeterMake::Keithley6485 => matches!(make, Make::Scpi | Make::Keithley),
+                sim::MeterMake::Newport1830C => matches!(make, Make::Newport),
+                sim::MeterMake::ThorlabsPm100 => matches!(make, Make::Scpi | Make::Thorlabs),
+            },
+        }
+    }
+}
+
+/// The devices of a rig file, the meter as the last.
+pub(super) fn of(devices: &Devices) -> Vec<Line> {
+    let axes = devices.axes.iter();
+    let axes = axes.map(|link| Line { device: Device::Axes(link.clone()), baud: link.baud });
+    let meter = match devices.photometer.driver {
+        PhotometerDriver::Keithley(_) | PhotometerDriver::Scpi(_) => sim::MeterMake::Keithley6485,
+        PhotometerDriver::Newport(_) => sim::MeterMake::Newport1830C,
+        PhotometerDriver::Thorlabs(_) => sim::MeterMake::ThorlabsPm100,
+    };
+    axes.chain([Line { device: Device::Meter(meter), baud: devices.photometer.baud }]).collect()
+}
+
+/// The devices that are asked for; all of the rig file's where none is. `None`: gonio's own
+/// controller. What the rig file has is as it has it; of what it has not, all axes are on one
+/// device.
+pub(super) fn wanted(makes: &[Make], rig: &Rig) -> Option<Vec<Line>> {
+    let there = rig.devices.as_ref().map(of);
+    if makes.is_empty() {
+        return there;
+    }
+    let makes = makes.iter().filter(|make| **make != Make::Native);
+    let wanted = makes.map(|make| {
+        let known = there.iter().flatten().find(|line| line.is(*make)).cloned();
+        known.unwrap_or_else(|| by_name(*make, rig))
+    });
+    let wanted: Vec<Line> = wanted.collect();
+    (!wanted.is_empty()).then_some(wanted)
+}
+
+fn by_name(make: Make, rig: &Rig) -> Line {
+    let axes = |driver: AxesDriver, zeros: Vec<f64>, baud: u32| {
+        let link = AxesLink { driver, port: None, baud, axes: AXES.to_vec(), zeros };
+        Line { device: Device::Axes(link), baud }
+    };
+    let meter = |make: sim::MeterMake, baud: u32| Line { device: Device::Meter(make), baud };
+    match make {
+        Make::Dynamixel => {
+            let driver =
+                AxesDriver::Dynamixel { ids: vec![1, 2, 3, 4], shutter: None, tolerance_steps: 12 };
+            axes(driver, vec![0.0; AXES.len()], 57_600)
+        }
+        Make::Grbl => {
+            // It homes upwards, and counts down from its switches.
+            let room = |axis: &Axis| if axis.name.is_rotary() { ROOM_RAD } else { ROOM_M };
+            let zeros = rig.axes.iter().map(|axis| -axis.travel.1 - room(axis)).collect();
+            let letters = vec!['X', 'Y', 'Z', 'A'];
+            let shutter = Some(GrblOutput::Flood);
+            axes(AxesDriver::Grbl { letters, shutter }, zeros, 115_200)
+        }
+        Make::Keithley | Make::Native | Make::Scpi => meter(sim::MeterMake::Keithley6485, 9_600),
+        Make::Newport => meter(sim::MeterMake::Newport1830C, 9_600),
+        Make::Thorlabs => meter(sim::MeterMake::ThorlabsPm100, 115_200),
+    }
+}
+
+/// The devices around one board.
+pub(super) fn bench(stage: &Stage, lines: &[Line], boot: u32) -> sim::Bench {
+    let board = sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot);
+    let nominal = board.nominal().clone();
+    let mut bench = sim::Bench::new(board);
+    for line in lines {
+        let wire = wire(stage, line.baud);
+        match &line.device {
+            Device::Axes(link) => match &link.driver {
+                AxesDriver::Dynamixel { ids, shutter, .. } => {
+                    let mut servos = servos(&nominal, ids, link);
+                    servos.extend(shutter.map(|shutter| {
+                        let ShutterServo { id, open_steps, closed_steps } = shutter;
+                        sim::ServoSetting::shutter(id, open_steps, closed_steps)
+                    }));
+                    let bus = sim::DynamixelBus::new(servos, bench.board_mut());
+                    bench.plug(bus, wire);
+                }
+                AxesDriver::Grbl { letters, .. } => {
+                    let twin = sim::GrblTwin::new(&nominal, &by_letter(letters, link));
+                    bench.plug(twin, wire);
+                }
+            },
+            Device::Meter(make) => {
+                bench.plug(sim::MeterTwin::new(*make), wire);
+            }
+        }
+    }
+    bench
+}
+
+/// The servos of a bus: which channel each moves, and where its zero stands on its encoder.
+fn servos(nominal: &sim::Nominal, ids: &[u8], link: &AxesLink) -> Vec<sim::ServoSetting> {
+    let servo = |((id, name), zero): ((&u8, &AxisName), &f64)| {
+        let place = AXES.iter().position(|axis| axis == name)?;
+        let axis = nominal.axes.get(place)?;
+        #[allow(clippy::cast_possible_truncation)] // the rig reader checked that counts fit
+        let zero_steps = (zero * axis.counts_per_unit).round() as i32;
+        let turn = 0..sim::ServoSetting::STEPS_A_TURN;
+        let (low, high) = axis.travel_counts;
+        let is_within = turn.contains(&(low + zero_steps)) && turn.contains(&(high + zero_steps));
+        let setting = sim::ServoSetting::new(*id, axis.channel);
+        let operating_mode = if is_within { 3 } else { 4 };
+        Some(sim::ServoSetting { zero_steps, operating_mode, ..setting })
+    };
+    ids.iter().zip(&link.axes).zip(&link.zeros).filter_map(servo).collect()
+}
+
+/// What a grbl's axes move, in its own order: the place in the rig, and the zero in degrees or
+/// millimetres.
+fn by_letter(letters: &[char], link: &AxesLink) -> Vec<(usize, f64)> {
+    let mut axes: Vec<(char, usize, f64)> = Vec::new();
+    for ((letter, name), zero) in letters.iter().zip(&link.axes).zip(&link.zeros) {
+        let place = AXES.iter().position(|axis| axis == name).unwrap_or_default();
+        let zero = if name.is_rotary() { zero.to_degrees() } else { zero * 1e3 };
+        axes.push((*letter, place, zero));
+    }
+    axes.sort_by_key(|(letter, ..)| "XYZABCUVW".find(*letter));
+    axes.into_iter().map(|(_, place, zero)| (place, zero)).collect()
+}
