@@ -29,6 +29,8 @@ fn on_devices() -> Bench {
     let link = format!("[link]\nkind = \"simulated\"\n\n{DEVICES}");
     Bench::small()
         .with("rig.toml", "readback = \"encoder\"", "readback = \"steps\"")
+        // The meter's own ranges.
+        .with("rig.toml", "full_scale_a = 1e-", "full_scale_a = 2e-")
         .with("rig.toml", ONE_LINK, &link)
 }
 

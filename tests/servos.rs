@@ -1,0 +1,182 @@
+//! A rig of Dynamixel servos and a meter, simulated: the example's plan in virtual time beside
+//! gonio's own controller, and over pseudo-terminals with kills in between. Would break: a reading
+//! lost or taken twice, a number that the meter did not say, axes that a dead host leaves moving.
+
+mod bench;
+
+use std::io::{BufRead as _, BufReader};
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use bench::Bench;
+use gonio::journal::{Order, Reader};
+
+/// Whatever takes longer has stuck.
+const PATIENCE: Duration = Duration::from_mins(2);
+
+struct Samples {
+    heads: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+fn samples(bench: &Bench, file: &str) -> Samples {
+    let text = bench.text(file);
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect());
+    let heads = lines.next().unwrap();
+    Samples { heads, rows: lines.collect() }
+}
+
+impl Samples {
+    fn column(&self, name: &str) -> Vec<f64> {
+        let place = self.heads.iter().position(|head| head == name).unwrap();
+        self.rows.iter().map(|row| row[place].parse().unwrap()).collect()
+    }
+}
+
+/// The example's plan, small: one spot, and steps of 40 and 60 degrees.
+fn small() -> Bench {
+    Bench::of("servo-arm")
+        .with("plan.toml", "x_count = 2", "x_count = 1")
+        .with("plan.toml", "y_count = 2", "y_count = 1")
+        .with("plan.toml", "theta_step_deg = 15", "theta_step_deg = 40")
+        .with("plan.toml", "phi_step_deg = 30", "phi_step_deg = 60")
+        .with("plan.toml", "angular_degree = 4", "angular_degree = 2")
+        .with("plan.toml", "position_degree = 1", "position_degree = 0")
+}
+
+#[test]
+fn the_plan_reads_the_same_through_servos_and_a_meter() {
+    let servos = Bench::of("servo-arm");
+    servos.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    // The same rig with a controller of gonio's own: its files differ in who is at the port.
+    let own = Bench::of("servo-arm");
+    let rig = own.text("rig.toml");
+    let (before, after) = rig.split_once("[[axes_link]]").unwrap();
+    let (_, simulated) = after.split_once("[simulated]").unwrap();
+    let own = own.having("rig.toml", format!("{before}[simulated]{simulated}"));
+    own.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    let [a, b] = [&servos, &own].map(|bench| samples(bench, "run/samples.csv"));
+    assert!(a.rows.len() == b.rows.len() && a.rows.len() > 100);
+    let radiance = "radiance_w_per_m2_sr";
+    let noise = "u_independent_radiance_w_per_m2_sr";
+    let pairs = a.column(radiance).into_iter().zip(b.column(radiance));
+    let noises = a.column(noise).into_iter().zip(b.column(noise));
+    for (row, ((a, b), (ua, ub))) in pairs.zip(noises).enumerate() {
+        let off = (a - b).abs() / ua.hypot(ub);
+        assert!(off < 6.0, "target {row}: {a} beside {b}, {off} uncertainties");
+    }
+    for name in ["theta_deg", "phi_deg", "x_mm", "y_mm"] {
+        for (a, b) in a.column(name).into_iter().zip(b.column(name)) {
+            assert!((a - b).abs() < 0.1, "{name}: {a} beside {b}");
+        }
+    }
+}
+
+/// A process that does not outlive its test.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The small plan on a rig whose devices are at ports; the simulated ones' file beside it.
+fn at_ports() -> Bench {
+    let bench = small();
+    let simulated = bench.text("rig.toml");
+    let (real, _) = simulated.split_once("\n[simulated]").unwrap();
+    let port = |name: &str| format!("\nport = \"{}\"", bench.path(name).display());
+    let real = real
+        .replace("kind = \"simulated\"", "kind = \"devices\"")
+        .replace("driver = \"dynamixel\"", &format!("driver = \"dynamixel\"{}", port("servos")))
+        .replace(
+            "driver = \"keithley-6485\"",
+            &format!("driver = \"keithley-6485\"{}", port("meter")),
+        );
+    bench.having("simulated.toml", simulated).having("rig.toml", real).with(
+        "plan.toml",
+        "scene = \"scene.toml\"\n",
+        "",
+    )
+}
+
+/// Both devices switched on.
+fn devices(bench: &Bench) -> Process {
+    let arguments =
+        ["sim", "--rig", "simulated.toml", "--scene", "scene.toml", "--pty", "servos,meter"];
+    let mut command = bench.command(&arguments);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut sim = Process(child);
+    let mut said = BufReader::new(sim.0.stdout.take().unwrap()).lines();
+    for link in ["servos", "meter"] {
+        assert_eq!(said.next().unwrap().unwrap(), link);
+    }
+    sim
+}
+
+/// How many readings are committed; none while there is no journal yet.
+fn committed(bench: &Bench) -> usize {
+    let reader = Reader::open(&bench.path("run/run.sqlite"));
+    reader.and_then(|reader| reader.readings(Order::Id)).map_or(0, |readings| readings.len())
+}
+
+#[test]
+fn over_terminals_a_killed_run_is_resumed_and_a_meter_that_is_unplugged_ends_it() {
+    let bench = at_ports();
+    let sim = devices(&bench);
+    // Both languages are recognised, and nothing moves.
+    let mut run = bench.command(&["run", "plan.toml", "--out", "run"]);
+    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    let deadline = Instant::now() + PATIENCE;
+    while committed(&bench) < 3 {
+        assert!(Instant::now() < deadline && run.0.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    // No last words: the servos stop by themselves.
+    run.0.kill().unwrap();
+    run.0.wait().unwrap();
+    let before = committed(&bench);
+    let mut run = bench.command(&["resume", "run"]);
+    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap());
+    while committed(&bench) < before + 2 {
+        assert!(Instant::now() < deadline && run.0.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    // All plugs out.
+    drop(sim);
+    let code = run.0.wait().unwrap().code();
+    assert_eq!(code, Some(1));
+    let _sim = devices(&bench);
+    bench.gonio(&["resume", "run"]).well();
+    let reader = Reader::open(&bench.path("run/run.sqlite")).unwrap();
+    let ids = reader.readings(Order::Id).unwrap().into_iter().map(|reading| reading.id);
+    // Those beyond are the references that a resume begins with.
+    let ids: Vec<u32> = ids.filter(|id| *id < 1 << 31).collect();
+    let count = u32::try_from(ids.len()).unwrap();
+    assert!(count > 10 && ids == (0..count).collect::<Vec<_>>(), "each once: {ids:?}");
+}
+
+#[test]
+fn what_is_wrong_with_servos_or_meter_is_found_before_anything_moves() {
+    let cases: [(&str, &str, &[&str]); 7] = [
+        ("theta = 1, phi = 2", "theta = 1, phi = 1", &["ids", "moves another axis already"]),
+        (
+            "{ theta = 1, phi = 2, x = 3, y = 4 }\nzero_deg = { theta = 180, phi",
+            "{ phi = 2, x = 3, y = 4 }\nzero_deg = { phi",
+            &["no device moves theta"],
+        ),
+        ("id = 5, open", "id = 2, open", &["servo 2 moves an axis"]),
+        ("closed_steps = 2048", "closed_steps = 1030", &["closed_steps", "200 steps apart"]),
+        ("nplc = 1", "nplc = 100", &["nplc", "0.01"]),
+        ("nplc = 1", "npcl = 1", &["did you mean `nplc`"]),
+        ("full_scale_a = 2e-7", "full_scale_a = 1e-7", &["a range of 1e-7 A", "2e-8"]),
+    ];
+    for (from, to, words) in cases {
+        let bench = small().with("rig.toml", from, to);
+        let before = bench.names();
+        bench.gonio(&["run", "plan.toml", "--out", "run"]).refused(words);
+        assert_eq!(bench.names(), before);
+    }
+}
