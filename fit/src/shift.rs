@@ -3,6 +3,7 @@
 //! afterwards.
 
 use crate::Ray;
+use radiometry::beam::Beam;
 use std::fmt;
 
 /// A source of uncertainty that all samples share. Components are independent of each other.
@@ -10,7 +11,7 @@ pub struct Common {
     /// What it is, as a budget's row names it. Of a name such as `theta readback @ 16°` the row has
     /// what stands before the @: components that differ by a place alone share a row.
     pub name: String,
-    /// Its standard uncertainty: relative for [`Shift::Scale`], in the value's unit for
+    /// Its standard uncertainty: relative for [`Shift::Scale`] and [`Shift::Beam`], in the value's unit for
     /// [`Shift::Offset`]. For the others it informs only: they are handed a shift by one u.
     pub u: f64,
     /// What being off by one u does to the samples.
@@ -29,6 +30,10 @@ pub enum Shift {
     /// position where no other sample was taken. It shifts nothing in common; it adds to the variance of
     /// each sample, by how much the fitted field changes from one ray to the other.
     Jitter(RayShift),
+    /// The beam that was really seen through. Values are too large by the factor 1 + u, by which its
+    /// throughput is larger than that of the beam they are taken for, and each is the mean over
+    /// another footprint. Without optics the factor is all.
+    Beam(Beam),
     /// By how much the value is too large, from the sample's index and its fitted level. For what
     /// holds for some samples alone, such as one gain range's factor.
     Value(ValueShift),
@@ -59,6 +64,7 @@ impl fmt::Debug for Shift {
             Self::Offset => "Offset",
             Self::Ray(_) => "Ray(..)",
             Self::Jitter(_) => "Jitter(..)",
+            Self::Beam(_) => "Beam(..)",
             Self::Value(_) => "Value(..)",
         })
     }

@@ -7,7 +7,7 @@
 
 use crate::basis::Basis;
 use crate::beam::Optics;
-use crate::beam::design::Design;
+use crate::beam::design::{Design, Through};
 use crate::check::check;
 use crate::fitted::Fit;
 use crate::influence::Watched;
@@ -320,7 +320,7 @@ pub(crate) fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
     match common.shift {
         Shift::Scale | Shift::Jitter(_) => false,
         Shift::Offset => !design.holds_constant(),
-        Shift::Ray(_) | Shift::Value(_) => true,
+        Shift::Ray(_) | Shift::Value(_) | Shift::Beam(_) => true,
     }
 }
 
@@ -333,8 +333,14 @@ pub(crate) fn sensitivities(
     let samples = design.samples();
     let Settled { coefficients, levels, .. } = settled;
     let mut room = design.room();
-    let mut change = |common: &Common, i: usize| match &common.shift {
+    let mut change = |common: &Common, through: Option<&mut Through>, i: usize| match &common.shift
+    {
         Shift::Scale => common.u * levels[i],
+        Shift::Beam(_) => {
+            let blurred =
+                through.map_or(0.0, |through| design.seen(i, through, coefficients, &mut room));
+            common.u * levels[i] + (1.0 + common.u) * blurred
+        }
         Shift::Offset => common.u,
         Shift::Value(excess) => excess(i, levels[i]),
         Shift::Ray(seen) | Shift::Jitter(seen) => {
@@ -344,7 +350,12 @@ pub(crate) fn sensitivities(
     };
     let mut sides = Vec::with_capacity(common.len());
     for common in common {
-        let side: Vec<f64> = (0..samples.len()).map(|i| change(common, i)).collect();
+        let mut through = match &common.shift {
+            Shift::Beam(beam) => design.through(beam)?,
+            _ => None,
+        };
+        let side = (0..samples.len()).map(|i| change(common, through.as_mut(), i));
+        let side: Vec<f64> = side.collect();
         if !side.iter().all(|value| value.is_finite()) {
             return Err(FitError::Common { name: common.name.clone() });
         }
@@ -367,7 +378,7 @@ pub(crate) fn shifts(
         Shift::Offset if design.holds_constant() => {
             design.basis().unity().iter().map(|value| c.u * value).collect()
         }
-        Shift::Offset | Shift::Ray(_) | Shift::Jitter(_) | Shift::Value(_) => {
+        Shift::Offset | Shift::Ray(_) | Shift::Jitter(_) | Shift::Value(_) | Shift::Beam(_) => {
             side += 1;
             unknowns(side)
         }

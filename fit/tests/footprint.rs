@@ -287,3 +287,73 @@ fn an_outline_without_area_is_refused() {
         assert_eq!(refusal, fit::FitError::Outline);
     }
 }
+
+/// One u of the spot's radius, 4 %, and what the throughput grows by.
+fn wider_spot() -> (Beam, f64) {
+    let wide = Beam::of_spot(0.00625, 0.0026, 0.3).unwrap();
+    let of = |beam: &Beam| beam.throughput().unwrap().m2_sr();
+    (wide, of(&wide) / of(&stock()) - 1.0)
+}
+
+fn spot_off() -> Common {
+    let (wide, u) = wider_spot();
+    Common { name: "throughput @ spot".into(), u, shift: Shift::Beam(wide) }
+}
+
+#[test]
+fn a_spot_that_is_wider_than_stated_shifts_the_fit_as_its_component_says() {
+    // A stripe of light about as wide as the spot, fitted in a basis that follows it.
+    let region = region(0.01, 60.0);
+    let stripe = |ray: &Ray| 1.0 + libm::exp(-(ray.x_m / 0.004).powi(2));
+    let basis = BasisSpec::zernike(0, 8);
+    let rays = spread_rays(300, &region, 4);
+    let optics = Optics { beam: stock(), outline: None };
+    let (wide, u) = wider_spot();
+    let through = |beam: &Beam| -> Vec<f64> {
+        rays.iter().map(|ray| read(beam, ray, 1 << 13, &stripe)).collect()
+    };
+    let fitted = |values: &[f64]| {
+        let noise = Noise::Fixed { variance: 1e-8 };
+        let all = rays.iter().zip(values);
+        let all: Vec<Sample> =
+            all.map(|(ray, value)| Sample { ray: *ray, value: *value, noise }).collect();
+        fit::fit_seen(&all, &region, basis, &[spot_off()], Some(&optics)).unwrap()
+    };
+    let plain = fitted(&through(&stock()));
+    let off: Vec<f64> = through(&wide).iter().map(|value| (1.0 + u) * value).collect();
+    let off = fitted(&off);
+    for x_m in [0.0, 0.002, 0.004, 0.006] {
+        let at = ray(x_m, 0.001, 20.0, 40.0);
+        let stated = plain.radiance_contributions(&at)[1].u;
+        let found = off.value(&at) - plain.value(&at);
+        assert!((found.abs() / stated - 1.0).abs() < 0.03, "{x_m}: {found} {stated}");
+    }
+    // At the top what the wider footprint blurs away takes from what the throughput adds.
+    let top = ray(0.0, 0.001, 20.0, 40.0);
+    let part = plain.radiance_contributions(&top)[1].u / (u * plain.value(&top));
+    assert!(part < 0.97, "{part}");
+}
+
+#[test]
+fn of_a_source_within_the_spot_the_spots_size_does_not_matter() {
+    let region = region(0.0, 30.0);
+    let outline = Some(Outline::Disk { centre_m: (0.0, 0.0), radius_m: 0.001 });
+    let optics = Optics { beam: stock(), outline };
+    let rays: Vec<Ray> = (0..8).map(|i| ray(0.0, 0.0, 3.0 * f64::from(i), 0.0)).collect();
+    let even = |ray: &Ray| {
+        read(&stock(), ray, 1 << 14, &|seen| {
+            f64::from(u8::from(libm::hypot(seen.x_m, seen.y_m) < 0.001))
+        })
+    };
+    let samples = samples(&rays, even);
+    let fit = |optics| {
+        let basis = BasisSpec::zernike(0, 0);
+        fit::fit_seen(&samples, &region, basis, &[spot_off()], optics).unwrap()
+    };
+    let (_, u) = wider_spot();
+    let of_spot = |fit: &fit::Fit| fit.contributions()[1].u / (u * fit.exitance().value);
+    // To the coarsest rule's error for so small a source.
+    assert!(of_spot(&fit(Some(&optics))) < 0.05, "{}", of_spot(&fit(Some(&optics))));
+    // Who knows nothing of beams takes it for a scale.
+    assert!((of_spot(&fit(None)) - 1.0).abs() < 1e-9, "{}", of_spot(&fit(None)));
+}

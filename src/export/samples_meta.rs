@@ -101,7 +101,9 @@ impl SamplesMeta<'_> {
         let quantity = self.rig.detector.quantity;
         let gain = |gain: u8| self.rig.detector.gains.get(usize::from(gain)).map(|gain| &gain.name);
         let one = |Component { name, u, effect }: &Component| match *effect {
-            Effect::Scale { gain: None } => json!({"name": name, "u_relative": u}),
+            Effect::Scale { gain: None } | Effect::Beam { .. } => {
+                json!({"name": name, "u_relative": u})
+            }
             Effect::Scale { gain: Some(of) } => {
                 json!({"name": name, "u_relative": u, "gain": gain(of)})
             }

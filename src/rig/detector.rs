@@ -198,14 +198,36 @@ impl Detector {
     /// The relative standard uncertainty of the throughput, from those of spot, pupil and
     /// distance by its partial derivatives. The same for all readings of a rig.
     pub fn u_throughput_relative(&self) -> f64 {
+        libm::sqrt(self.throughput_terms().iter().map(|term| term * term).sum())
+    }
+
+    /// By how much the throughput grows, relative, as the spot's radius, the pupil's and the distance
+    /// grow by u each.
+    fn throughput_terms(&self) -> [f64; 3] {
         let partials = self.disks().and_then(CoaxialDisks::partials).expect(CHECKED);
         let terms = [
             partials.per_radius_1 * self.u_spot_radius_m,
             partials.per_radius_2 * self.u_pupil_radius_m,
             partials.per_distance * self.u_distance_m,
         ];
-        let u_m2_sr = libm::sqrt(terms.iter().map(|term| term * term).sum());
-        u_m2_sr / self.throughput_m2_sr()
+        terms.map(|term| term / self.throughput_m2_sr())
+    }
+
+    /// The beams that are off by u of one of their lengths to the side where the throughput grows, by
+    /// how much it grows, relative, and which length; `None` where there is no such beam.
+    pub(super) fn beams_off(&self) -> [(&'static str, f64, Option<Beam>); 3] {
+        let [spot, pupil, distance] = self.throughput_terms();
+        let off = |u_m: f64, term: f64| if term < 0.0 { -u_m } else { u_m };
+        let (pupil_m, spot_m, distance_m) =
+            (self.pupil_radius_m, self.spot_radius_m, self.distance_m);
+        let other_spot = spot_m + off(self.u_spot_radius_m, spot);
+        let other_pupil = pupil_m + off(self.u_pupil_radius_m, pupil);
+        let other_distance = distance_m + off(self.u_distance_m, distance);
+        [
+            ("spot", spot.abs(), Beam::of_spot(pupil_m, other_spot, distance_m).ok()),
+            ("pupil", pupil.abs(), Beam::of_spot(other_pupil, spot_m, distance_m).ok()),
+            ("distance", distance.abs(), Beam::of_spot(pupil_m, spot_m, other_distance).ok()),
+        ]
     }
 
     /// The relative standard uncertainty of what all its readings are multiplied by, the range's
@@ -303,6 +325,20 @@ mod tests {
         let u_pupil_radius_m = 0.01 * detector.pupil_radius_m;
         let both = Detector { u_pupil_radius_m, ..detector };
         assert!((both.u_throughput_relative() - 0.02 * 2.0_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_beams_that_may_be_have_the_throughput_that_they_are_said_to_have() {
+        let detector = detector();
+        let whole = detector.throughput_m2_sr();
+        let mut squares = 0.0;
+        for (length, u, beam) in detector.beams_off() {
+            let growth = beam.unwrap().throughput().unwrap().m2_sr() / whole - 1.0;
+            // A second order of what is off.
+            assert!(u > 0.0 && (growth - u).abs() < u * u, "{length}: {growth} {u}");
+            squares += u * u;
+        }
+        assert!((libm::sqrt(squares) / detector.u_throughput_relative() - 1.0).abs() < 1e-12);
     }
 
     #[test]

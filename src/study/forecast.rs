@@ -128,6 +128,9 @@ impl Forecast {
         if prior.exponent <= 0.0 && plan.sample.is_none() {
             // Being off along an even field changes nothing.
             common.retain(|c| !matches!(c.shift, Shift::Ray(_) | Shift::Jitter(_)));
+            for common in common.iter_mut().filter(|c| matches!(c.shift, Shift::Beam(_))) {
+                common.shift = Shift::Scale;
+            }
         }
         let flown: Vec<_> = places.iter().map(|i| calibrated.samples[*i].flown()).collect();
         let (readings, coefficients) = (samples.len(), model.basis.len());
@@ -270,9 +273,10 @@ fn add(noise: &mut Noise, more: f64) {
     }
 }
 
-/// The components that are a factor common to all readings.
+/// The components that are a factor common to all readings, as a budget's rows name them.
 fn scales(calibrated: &Calibrated) -> Vec<String> {
-    let is_scale = |effect: Effect| matches!(effect, Effect::Scale { .. });
+    let is_scale = |effect: Effect| matches!(effect, Effect::Scale { .. } | Effect::Beam { .. });
     let scales = calibrated.components.iter().filter(|component| is_scale(component.effect));
-    scales.map(|component| component.name.clone()).collect()
+    let row = |name: &str| name.split_once(" @ ").map_or(name, |(row, _)| row).to_owned();
+    scales.map(|component| row(&component.name)).collect()
 }

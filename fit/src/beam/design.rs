@@ -15,6 +15,7 @@ use super::{Averager, Cover, Means, Optics, way};
 use crate::basis::{Basis, Scratch, dot};
 use crate::weights::Model;
 use crate::{FitError, Ray, Sample};
+use radiometry::beam::Beam;
 
 /// How the rows of a fit stand for the beam.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -79,6 +80,14 @@ struct Averaged {
     /// What each row's quadrature may err by, in the samples' unit.
     errors: Vec<f64>,
     rows: BeamRows,
+}
+
+/// Another beam than the one that the rows stand for, with room of its own: what its averages find out
+/// holds for it alone.
+#[derive(Debug)]
+pub(crate) struct Through {
+    averager: Averager,
+    means: Means,
 }
 
 /// Room for evaluations.
@@ -216,6 +225,40 @@ impl<'s> Design<'s> {
             dot(&room.row, coefficients)
         };
         level(seen) - level(ray)
+    }
+
+    /// Another beam for the same readings, cut by the same outline; `None` where there is no beam.
+    pub(crate) fn through(&self, beam: &Beam) -> Result<Option<Through>, FitError> {
+        let other = |own: &Averaged| {
+            let optics = Optics { beam: *beam, ..own.averager.optics };
+            let averager = Averager::new(&optics, self.basis)?;
+            Ok(Through { averager, means: Means::new(self.basis) })
+        };
+        self.beam.as_ref().map(other).transpose()
+    }
+
+    /// By how much the mean over a sample's beam changes when it is seen through another one. Nothing
+    /// where the beam's width doesn't show.
+    pub(crate) fn seen(
+        &self,
+        i: usize,
+        through: &mut Through,
+        coefficients: &[f64],
+        room: &mut Room,
+    ) -> f64 {
+        let Some(Averaged { averager, kinds, .. }) = &self.beam else { return 0.0 };
+        // The same rule for both, so that its error cancels.
+        let kind = match kinds[i] {
+            Kind::Point | Kind::Off => return 0.0,
+            Kind::Across(_) => Kind::Across(0),
+            smooth @ Kind::Smooth(_) => smooth,
+        };
+        let ray = &self.samples[i].ray;
+        let mut level = |averager: &Averager, means: &mut Means| {
+            averager.row(kind, ray, self.basis, means, &mut room.row);
+            dot(&room.row, coefficients)
+        };
+        level(&through.averager, &mut through.means) - level(averager, &mut room.means)
     }
 
     /// Whether an offset of all readings is a constant field: not where something cuts a beam.

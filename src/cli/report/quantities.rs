@@ -135,6 +135,7 @@ pub(super) fn scale_u_relative(calibrated: &Calibrated) -> f64 {
     let is_everywhere = |gain: u8| samples.iter().all(|sample| sample.gain == gain);
     let squares = calibrated.components.iter().map(|component| match component.effect {
         Effect::Scale { gain } if gain.is_none_or(is_everywhere) => component.u * component.u,
+        Effect::Beam { .. } => component.u * component.u,
         _ => 0.0,
     });
     libm::sqrt(squares.sum())

@@ -2,6 +2,8 @@
 //! makes it smaller.
 
 use super::{Dark, Sample};
+use radiometry::beam::Beam;
+
 use crate::rig::{AXES, AxisName, AxisPositions, Misalignment, Pose, Rig, forward};
 
 /// A source of uncertainty that samples share. Components are independent of each other.
@@ -9,7 +11,7 @@ use crate::rig::{AXES, AxisName, AxisPositions, Misalignment, Pose, Rig, forward
 pub struct Component {
     /// What it is, as a budget's row names it.
     pub name: String,
-    /// Its standard uncertainty: relative for [`Effect::Scale`], in the unit of radiance for
+    /// Its standard uncertainty: relative for [`Effect::Scale`] and [`Effect::Beam`], in the unit of radiance for
     /// [`Effect::Offset`], radians or metres for what moves rays.
     pub u: f64,
     /// What it does, and to which samples.
@@ -17,12 +19,19 @@ pub struct Component {
 }
 
 /// What being off by a component does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Effect {
     /// Values are too large by the factor 1 + u.
     Scale {
         /// In this gain range alone; `None` in all.
         gain: Option<u8>,
+    },
+    /// The beam is another one than the rig's file says, as far off as it may be by u of one of its
+    /// lengths, to the side where the throughput grows. Values are too large by the factor 1 + u,
+    /// and each is the mean over the footprint of that beam.
+    Beam {
+        /// What was really seen through.
+        beam: Beam,
     },
     /// Values are too large by u.
     Offset {
@@ -53,7 +62,7 @@ impl Component {
     /// Whether it concerns the sample.
     pub fn concerns(&self, sample: &Sample) -> bool {
         match self.effect {
-            Effect::Readback { .. } | Effect::Alignment { .. } => true,
+            Effect::Readback { .. } | Effect::Alignment { .. } | Effect::Beam { .. } => true,
             Effect::Scale { gain } => gain.is_none_or(|gain| gain == sample.gain),
             Effect::Offset { gain } => gain == sample.gain,
             Effect::Axis { session, .. } => session.is_none_or(|session| session == sample.session),
@@ -64,7 +73,7 @@ impl Component {
     /// sample's level; 0 for what moves rays.
     pub fn excess(&self, sample: &Sample, level: f64) -> f64 {
         match self.effect {
-            Effect::Scale { .. } if self.concerns(sample) => self.u * level,
+            Effect::Scale { .. } | Effect::Beam { .. } if self.concerns(sample) => self.u * level,
             Effect::Offset { .. } if self.concerns(sample) => self.u,
             _ => 0.0,
         }
@@ -93,8 +102,12 @@ pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component
     let mut all = vec![
         component("responsivity", detector.u_responsivity_relative, everywhere),
         component("spectral mismatch", detector.u_spectral_mismatch_relative, everywhere),
-        component("throughput", detector.u_throughput_relative(), everywhere),
     ];
+    all.extend(detector.beams_off().into_iter().map(|(length, u, beam)| {
+        // An error only where u is as large as the length itself.
+        let effect = beam.map_or(everywhere, |beam| Effect::Beam { beam });
+        component(&format!("throughput @ {length}"), u, effect)
+    }));
     for dark in darks.iter().filter(|dark| samples.iter().any(|s| s.gain == dark.gain)) {
         let gain = &detector.gains[usize::from(dark.gain)];
         let scale = Effect::Scale { gain: Some(dark.gain) };

@@ -101,6 +101,7 @@ fn common(component: &Component, used: &Arc<[Sample]>) -> Common {
     let (samples, own) = (Arc::clone(used), component.clone());
     let shift = match component.effect {
         Effect::Scale { .. } if concerns_all => Shift::Scale,
+        Effect::Beam { beam } => Shift::Beam(beam),
         Effect::Offset { .. } if concerns_all => Shift::Offset,
         Effect::Scale { .. } | Effect::Offset { .. } => {
             Shift::Value(Box::new(move |i, level| own.excess(&samples[i], level)))
