@@ -26,3 +26,5 @@ example=examples/servo-arm
     "$PWD/target/debug/gonio" $example/rig.toml $example/scene.toml "$folder/servos"
 "$environment/bin/python" tests/clients/meters.py \
     "$PWD/target/debug/gonio" $example/rig.toml $example/scene.toml "$folder/meter"
+"$environment/bin/python" tests/clients/grbl_job.py \
+    "$PWD/target/debug/gonio" examples/lambertian/scene.toml "$folder/grbl"
