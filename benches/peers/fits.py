@@ -244,12 +244,14 @@ def section(rows, date, beside):
         "|---|--:|--:|--:|--:|--:|--:|---|--:|--:|---|",
     ]
     for scene, found in rows:
-        best = min((name for name in splines if name in found), key=lambda name: found[name][0])
+        best = min((name for name in splines if name in found), key=lambda name: found[name][0], default=None)
         process = found["gaussian_process"]
-        winner = min(["gonio", best, "gaussian_process"], key=lambda name: found[name][0])
+        winner = min(filter(None, ["gonio", best, "gaussian_process"]), key=lambda name: found[name][0])
+        # Splines of one direction know no places; neighbours at one place are too flat for RBFs.
+        of_splines = f"{100 * found[best][0]:.3f} | {found[best][1]:.2f} | {NAMES[best]}, {found[best][2]}" if best else "none | | "
         lines.append(
             f"| {SAID[scene['scene']]} | {scene['readings']} | {100 * found['gonio'][0]:.3f} | {found['gonio'][1]:.2f} | {scene['coefficients']} "
-            f"| {100 * found[best][0]:.3f} | {found[best][1]:.2f} | {NAMES[best]}, {found[best][2]} "
+            f"| {of_splines} "
             f"| {100 * process[0]:.3f} | {process[1]:.1f} | {NAMES.get(winner, '**gonio**')} |"
         )
     lines += ["", f"`benches/peers/fits.sh`  ", f"{date} · beside it: {beside}"]

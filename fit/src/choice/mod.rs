@@ -198,11 +198,9 @@ pub fn choose(
         search.run()?;
         Ok(search.tried)
     };
-    // Where nothing is held, few lines less leave little determined.
-    let is_plain = wish.penalty().is_some_and(|penalty| penalty.is_none());
-    let lines_min = if is_plain { PLAIN_LINES_MIN } else { 0 };
-    let mut n_lines = sweeps.shared_lines().filter(|lines| *lines >= lines_min);
+    let mut n_lines = sweeps.shared_lines();
     let mut tried = found(n_lines.is_none())?;
+    // Where nothing is held, a line less may leave nothing determined.
     if tried.is_empty() && n_lines.is_some() {
         n_lines = None;
         tried = found(true)?;
@@ -313,8 +311,6 @@ fn truncation(tried: &[(BasisSpec, Trial)]) -> f64 {
     falling.clamp(0.0, chosen.misfit).sqrt()
 }
 
-/// Of fewer lines none is left out where nothing is held against rough fields.
-const PLAIN_LINES_MIN: usize = 4;
 /// A basis with fewer functions by this factor is a coarser one.
 const COARSER: f64 = 1.2;
 /// What a finer basis may cost in log density a reading: a twentieth of u.
