@@ -219,6 +219,7 @@ fn record(id: u32) -> Record {
         end_us: i64::from(id) * 500_000 + 50_000,
         time_s: 0.5 * t + 22.644_22,
         session: 0,
+        device_times: gonio::rig::DeviceTimes::default(),
         link_retries: 0,
         unsettled: false,
     })

@@ -16,6 +16,9 @@ use crate::device::controller::{LinkLost, Order, Said};
 
 /// Read at a time, bytes.
 const READ_BYTES: usize = 1024;
+/// A wake-up that is due still after it was served comes again so much later: a driver that forgets to
+/// put its time-out off must not keep bytes and stops from being heard.
+const LULL: Duration = Duration::from_millis(1);
 /// How long axes may take to come to rest once nobody listens.
 const LAST_STOP: Duration = Duration::from_secs(5);
 
@@ -47,6 +50,7 @@ pub(in crate::device) async fn pump(
     });
     // Once nobody listens: until when to wait for the axes to stand.
     let mut last_stop: Option<tokio::time::Instant> = None;
+    let mut served: Option<tokio::time::Instant> = None;
     loop {
         let now = Instant::ZERO + origin.elapsed();
         for (n, port) in ports.iter_mut().enumerate() {
@@ -66,6 +70,10 @@ pub(in crate::device) async fn pump(
             return;
         }
         let wake = composer.poll_timeout().map(|at| origin + Duration::from_micros(at.micros()));
+        let wake = wake.map(|at| match served {
+            Some(last) if at <= last => last + LULL,
+            _ => at,
+        });
         let wake = [wake, last_stop].into_iter().flatten().min();
         tokio::select! {
             biased;
@@ -82,6 +90,7 @@ pub(in crate::device) async fn pump(
                 if last_stop.is_some_and(|end| end <= tokio::time::Instant::now()) {
                     return;
                 }
+                served = Some(tokio::time::Instant::now());
                 composer.handle_timeout(Instant::ZERO + origin.elapsed());
             }
             (n, heard) = next(&mut ports) => {

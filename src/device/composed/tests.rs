@@ -24,6 +24,8 @@ struct Script {
     told: Vec<String>,
     axes: VecDeque<AxesEvent>,
     meter: VecDeque<PhotometerEvent>,
+    /// Whether its time-out is never put off.
+    is_due: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -49,7 +51,7 @@ impl Driver for Puppet {
         None
     }
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        self.0.lock().unwrap().is_due.then_some(Instant::ZERO)
     }
     fn name(&self) -> &'static str {
         "puppet"
@@ -399,4 +401,16 @@ fn a_board_that_boots_ends_the_session_and_loses_its_home() {
     play.arm_says(AxesEvent::Ready(facts()));
     let said = play.table_says(AxesEvent::Located(at([0, 0])));
     assert!(matches!(said[..], [DeviceEvent::Reply { reply: Reply::Identity(_), .. }]));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_driver_that_is_always_due_keeps_nobody_from_ending_it() {
+    let play = Play::new();
+    play.arm.0.lock().unwrap().is_due = true;
+    let (orders, to_pump) = tokio::sync::mpsc::unbounded_channel();
+    let (from_pump, _said) = tokio::sync::mpsc::unbounded_channel();
+    let pump = tokio::spawn(super::pump::pump(play.composer, Vec::new(), to_pump, from_pump));
+    drop(orders);
+    // Simulated time goes on, which it does not while a task never rests.
+    tokio::time::timeout(std::time::Duration::from_mins(1), pump).await.unwrap().unwrap();
 }
