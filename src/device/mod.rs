@@ -1,7 +1,7 @@
 //! How hardware is spoken to: links, which know bytes, and drivers, which know what bytes mean to
 //! one kind of device. A simulated rig is one more link; nothing here can tell.
 //!
-//! [`Controller`] is what a run drives. Behind it stands a controller of gonio's own ([`native`]),
+//! [`Controller`] is what a run drives. Behind it stands a controller of gonio's own (`native`),
 //! or a [`Composer`] with a driver for each of several devices: [`Axes`] move, a [`Photometer`]
 //! reads.
 //!
