@@ -21,6 +21,12 @@ pub(crate) fn board() -> SimulatedBoard {
         u_homing: 0.0,
         u_readback: 0.0,
     };
+    // At boot it looks at the middle of the patch.
+    board_of(axis, Simulated { start: [Some(0.5); 4], ..Simulated::default() })
+}
+
+/// A board with these axes over that patch.
+pub(crate) fn board_of(axis: impl Fn(u8) -> NominalAxis, simulated: Simulated) -> SimulatedBoard {
     let nominal = Nominal {
         quantity: Quantity::Radiance,
         axes: [axis(0), axis(1), axis(2), axis(3)],
@@ -41,8 +47,6 @@ pub(crate) fn board() -> SimulatedBoard {
     };
     let patch = Emitter::lambertian(Shape::rectangle(0.0, 0.0, 0.04, 0.04), 40.0);
     let scene = Scene::new(Quantity::Radiance).with(patch).unwrap();
-    // At boot it looks at the middle of the patch.
-    let simulated = Simulated { start: [Some(0.5); 4], ..Simulated::default() };
     let compiled = compile(scene, nominal, simulated, &Terms::seeded(1)).unwrap();
     SimulatedBoard::new(Arc::new(compiled), 0)
 }

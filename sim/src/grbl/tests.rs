@@ -1,17 +1,14 @@
 //! What the twin must share with the firmware that it stands for: the facts that were measured on
 //! grbl 1.1h.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use firmware_protocol::Instant;
 
 use super::GrblTwin;
+use crate::bench::tests::board_of;
 use crate::wire::Wire;
-use crate::{
-    Bench, Emitter, Nominal, NominalAxis, NominalDetector, NominalGain, Quantity, Scene, Shape,
-    Simulated, SimulatedBoard, Terms, compile,
-};
+use crate::{Bench, NominalAxis, Simulated, SimulatedBoard};
 
 /// 1000 steps a degree or a millimetre, ±50 of them, at 100 a second and 1000 a second squared.
 fn board() -> SimulatedBoard {
@@ -27,28 +24,7 @@ fn board() -> SimulatedBoard {
         u_homing: 0.0,
         u_readback: 0.0,
     };
-    let nominal = Nominal {
-        quantity: Quantity::Radiance,
-        axes: [axis(0), axis(1), axis(2), axis(3)],
-        detector: NominalDetector {
-            distance_m: 0.3,
-            u_distance_m: 0.0,
-            pupil_radius_m: 0.006,
-            u_pupil_radius_m: 0.0,
-            spot_radius_m: 0.002,
-            u_spot_radius_m: 0.0,
-            responsivity_a_per_w: 0.2,
-            u_responsivity_relative: 0.0,
-            read_noise_a: 0.0,
-            gains: vec![NominalGain { name: "1 uA".into(), full_scale_a: 1e-6, u_relative: 0.0 }],
-            adc_bits: 24,
-            adc_rate_hz: 2000,
-        },
-    };
-    let patch = Emitter::lambertian(Shape::rectangle(0.0, 0.0, 0.04, 0.04), 40.0);
-    let scene = Scene::new(Quantity::Radiance).with(patch).unwrap();
-    let compiled = compile(scene, nominal, Simulated::default(), &Terms::seeded(1)).unwrap();
-    SimulatedBoard::new(Arc::new(compiled), 0)
+    board_of(axis, Simulated::default())
 }
 
 /// Three axes behind a wire of 115200 baud, switched on.
