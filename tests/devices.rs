@@ -144,11 +144,12 @@ fn a_run_that_is_interrupted_stops_its_devices_and_is_carried_on() {
 
 #[test]
 fn what_a_rig_file_gets_wrong_about_its_devices_is_named() {
-    let cases: [(&str, &str, &[&str]); 6] = [
+    let cases: [(&str, &str, &[&str]); 7] = [
         ("theta = \"X\"", "theta = \"Y\"", &["rig.toml", "letters", "another axis's already"]),
         (", y = \"A\"", "", &["zero_mm.y: unknown key"]),
         ("theta = \"X\"", "theta = \"Q\"", &["no letter of an axis"]),
         ("shutter = \"flood\"", "shuter = \"flood\"", &["did you mean `shutter`"]),
+        ("shutter = \"flood\"\n", "", &["plan.toml", "dark.method", "has no shutter"]),
         ("driver = \"keithley-6485\"", "driver = \"keithley\"", &["keithley-6485"]),
         ("theta = -100", "theta = -10", &["theta", "travel", "the device allows"]),
     ];

@@ -10,8 +10,8 @@ use spanned_toml::{Problem, Source};
 use super::builder::{Builder, Place, step};
 use super::order::{self, Visit};
 use super::{
-    Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, TARGETS_MAX, Target, grid,
-    list, sweep,
+    DarkMethod, Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, TARGETS_MAX,
+    Target, grid, list, sweep,
 };
 use crate::rig::{AxisPositions, LimitError, Pose, ReadingKind, Rig};
 
@@ -32,6 +32,7 @@ impl Plan {
     pub fn lay_out(&self, rig: &Rig, list: Option<&Source>) -> Result<Sequence, Problem> {
         let gain = self.gain_on(rig)?;
         self.check_dwells(rig)?;
+        self.check_dark(rig)?;
         self.check_expected(rig)?;
         let reference = self.reference_on(rig)?;
         match self.schedule {
@@ -88,6 +89,20 @@ impl Plan {
             }
         }
         Ok(())
+    }
+
+    /// A shutter has to be there to be closed.
+    fn check_dark(&self, rig: &Rig) -> Result<(), Problem> {
+        if self.dark.method != DarkMethod::Shutter || rig.has_shutter() {
+            return Ok(());
+        }
+        Err(self.problem(
+            "dark",
+            "method",
+            &format!("{} has no shutter", rig.name),
+            "\"source-off\", where a person switches the source",
+            "say so, or give an [[axes_link]] of the rig file its `shutter`",
+        ))
     }
 
     pub(super) fn reference_on(&self, rig: &Rig) -> Result<Place, Problem> {

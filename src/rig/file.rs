@@ -54,7 +54,7 @@ impl Rig {
             return Err(root.problem(
                 "simulated",
                 "a table for simulated rigs in the file of a real one",
-                "no such table where link.kind is \"serial\"",
+                "no such table unless link.kind is \"simulated\"",
                 "remove it, or set link.kind to \"simulated\"",
             ));
         }

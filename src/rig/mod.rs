@@ -63,4 +63,14 @@ impl Rig {
     pub fn is_simulated(&self) -> bool {
         matches!(self.link, Link::Simulated { .. })
     }
+
+    /// Whether a shutter can be closed before the detector. A controller of gonio's own has one; of
+    /// other devices the file says which.
+    pub fn has_shutter(&self) -> bool {
+        let holds = |link: &AxesLink| match &link.driver {
+            AxesDriver::Dynamixel { shutter, .. } => shutter.is_some(),
+            AxesDriver::Grbl { shutter, .. } => shutter.is_some(),
+        };
+        self.devices.as_ref().is_none_or(|devices| devices.axes.iter().any(holds))
+    }
 }
