@@ -4,12 +4,14 @@
 //! Everything happens at its exact microsecond and in one order, whichever line it came by and
 //! however late the caller is. It reads no clock and does no I/O: [`crate::serve_bench`] does.
 
+use core::time::Duration;
 use std::collections::VecDeque;
 
 use firmware_protocol::Instant;
 
+use crate::faults::{Faults, Turn};
 use crate::wire::Wire;
-use crate::{SimulatedBoard, Twin};
+use crate::{DeviceFault, FaultKind, SimulatedBoard, Twin};
 
 /// A board and the devices that share it. Lines are numbered in the order of [`Bench::plug`].
 pub struct Bench {
@@ -17,7 +19,28 @@ pub struct Bench {
     lines: Vec<Line>,
     /// Everything up to here has happened.
     clock: Instant,
+    /// Where the axes were sent last, and since when they are there.
+    setpoints: [i64; 4],
+    /// No earlier than the last fault.
+    at_rest_since: Instant,
+    /// Since the last fault began, nobody was told that the axes stand.
+    awaits_rest: bool,
+    notes: Vec<Note>,
 }
+
+/// Something that a person who looks at the bench would notice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Note {
+    /// A fault of this line's device began.
+    Began(Instant, usize, FaultKind),
+    /// It is over.
+    Ended(Instant, usize, FaultKind),
+    /// The axes stand since then, the first time since a fault began.
+    AtRest(Instant),
+}
+
+/// Axes that have not moved for so long stand.
+const STANDS_AFTER: Duration = Duration::from_millis(500);
 
 struct Line {
     twin: Box<dyn Twin>,
@@ -28,6 +51,7 @@ struct Line {
     /// What is on its way out, with the moment at which the last byte has passed.
     outward: VecDeque<(Instant, Vec<u8>)>,
     outward_free: Instant,
+    faults: Faults,
 }
 
 /// What happens next on a bench.
@@ -35,6 +59,10 @@ struct Line {
 enum Due {
     /// A byte arrives on this line.
     Byte(usize),
+    /// A fault of this line begins or ends.
+    Fault(usize),
+    /// Somebody looks whether the axes stand.
+    Look,
     /// This line's twin wakes.
     Timeout(usize),
 }
@@ -42,7 +70,15 @@ enum Due {
 impl Bench {
     /// A bench with nothing on it but the board.
     pub const fn new(board: SimulatedBoard) -> Self {
-        Self { board, lines: Vec::new(), clock: Instant::ZERO }
+        Self {
+            board,
+            lines: Vec::new(),
+            clock: Instant::ZERO,
+            setpoints: [0; 4],
+            at_rest_since: Instant::ZERO,
+            awaits_rest: false,
+            notes: Vec::new(),
+        }
     }
 
     /// Puts a device on a line of its own; the line's number.
@@ -54,8 +90,26 @@ impl Bench {
             inward_free: self.clock,
             outward: VecDeque::new(),
             outward_free: self.clock,
+            faults: Faults::default(),
         });
         self.lines.len() - 1
+    }
+
+    /// Something is to go wrong with a line's device.
+    pub fn plan_fault(&mut self, line: usize, fault: DeviceFault) {
+        if let Some(line) = self.lines.get_mut(line) {
+            line.faults.add(fault);
+        }
+    }
+
+    /// Whether a line's plug is in.
+    pub fn is_plugged(&self, line: usize) -> bool {
+        self.lines.get(line).is_none_or(|line| !line.faults.has(FaultKind::Unplugged))
+    }
+
+    /// What there was to be noticed since this was last asked.
+    pub fn take_notes(&mut self) -> Vec<Note> {
+        std::mem::take(&mut self.notes)
     }
 
     /// How many lines there are.
@@ -107,23 +161,49 @@ impl Bench {
         for line in &mut self.lines {
             line.twin.follow(&mut self.board, now);
         }
-        let (Due::Byte(i) | Due::Timeout(i)) = due;
+        self.look_whether_axes_move(now);
+        let (Due::Byte(i) | Due::Fault(i) | Due::Timeout(i)) = due else { return };
         let Some(line) = self.lines.get_mut(i) else { return };
         match due {
             Due::Byte(_) => {
-                if let Some((_, byte)) = line.inward.pop_front() {
+                if let Some((_, byte)) = line.inward.pop_front()
+                    && line.faults.hears()
+                {
                     line.twin.handle_bytes(&mut self.board, now, &[byte]);
                 }
             }
+            Due::Fault(_) => match line.faults.turn(now) {
+                Some(Turn::Began(kind)) => {
+                    line.twin.fail(&mut self.board, now, kind);
+                    (self.awaits_rest, self.at_rest_since) = (true, now);
+                    self.notes.push(Note::Began(now, i, kind));
+                }
+                Some(Turn::Ended(kind)) => self.notes.push(Note::Ended(now, i, kind)),
+                None => {}
+            },
             Due::Timeout(_) => line.twin.handle_timeout(&mut self.board, now),
+            Due::Look => {}
         }
+        line.faults.notice(now, line.twin.deeds());
         self.transmit(i);
+    }
+
+    /// Twins wake when a motion of theirs ends: what changed since the last look moved until now.
+    fn look_whether_axes_move(&mut self, now: Instant) {
+        let setpoints = self.board.setpoints();
+        if setpoints != self.setpoints {
+            self.setpoints = setpoints;
+            self.at_rest_since = now;
+        } else if self.awaits_rest && now.since(self.at_rest_since) >= STANDS_AFTER {
+            self.awaits_rest = false;
+            self.notes.push(Note::AtRest(self.at_rest_since));
+        }
     }
 
     fn transmit(&mut self, line: usize) {
         let now = self.clock;
         let Some(line) = self.lines.get_mut(line) else { return };
-        let bytes = line.twin.poll_transmit();
+        let bytes = line.faults.passes(line.twin.poll_transmit());
         if !bytes.is_empty() {
             line.outward_free = line.wire.passed(line.outward_free.max(now), bytes.len());
             let carried = line.wire.carry(&bytes);
@@ -148,10 +228,12 @@ impl Bench {
         let events = lines.flat_map(|(i, line)| {
             let byte = line.inward.front().map(|(at, _)| (*at, Due::Byte(i)));
             let wake = line.twin.poll_timeout(&self.board).map(|at| (at, Due::Timeout(i)));
-            [wake, byte].into_iter().flatten()
+            let fault = line.faults.next().map(|at| (at, Due::Fault(i)));
+            [wake, byte, fault].into_iter().flatten()
         });
+        let look = self.awaits_rest.then(|| (self.at_rest_since + STANDS_AFTER, Due::Look));
         // The first of equals: the order of the lines, time-outs before bytes.
-        events.min_by_key(|(at, _)| *at)
+        events.chain(look).min_by_key(|(at, _)| *at)
     }
 }
 

@@ -107,6 +107,12 @@ impl SimulatedBoard {
         mix(place ^ u64::from(*visits)) as u32
     }
 
+    /// Where the drives were sent, whole counts in the order θ, φ, x, y.
+    #[allow(clippy::cast_possible_truncation)] // saturating
+    pub(crate) fn setpoints(&self) -> [i64; 4] {
+        self.axes.each_ref().map(|axis| libm::round(axis.setpoint_counts()) as i64)
+    }
+
     /// The rig file's description of the rig.
     pub fn nominal(&self) -> &Nominal {
         &self.compiled.nominal

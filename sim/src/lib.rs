@@ -18,6 +18,7 @@ mod compile;
 mod detector;
 mod dynamixel;
 mod effect;
+mod faults;
 mod field;
 mod grbl;
 mod levels;
@@ -39,12 +40,13 @@ mod truth;
 mod twin;
 mod wire;
 
-pub use bench::Bench;
+pub use bench::{Bench, Note};
 pub use board::SimulatedBoard;
 pub use compile::{CompileError, Compiled, compile};
 pub use detector::{DetectorFlaws, Drift, Flicker, GainSwitching};
 pub use dynamixel::{DynamixelBus, ServoFault, ServoLoad, ServoSetting};
 pub use effect::{Bound, BoundUnit, EffectRow};
+pub use faults::{DeviceFault, FaultKind};
 pub use field::Ray;
 pub use grbl::GrblTwin;
 pub use mechanics::{
@@ -60,7 +62,7 @@ pub use scene::{
     Lobe, Lobes, Outline, Reflection, SHARPNESS_MAX, Scene, SceneError, Shape, Solid, Surface,
     Tabulated, TabulatedError, Window, WindowOwner,
 };
-pub use serve::{serve, serve_bench};
+pub use serve::{serve, serve_bench, serve_bench_at};
 pub use simulated::{LinkFaults, Simulated};
 pub use terms::Terms;
 pub use time::{MainsFlicker, SourceOverTime, WarmUp};

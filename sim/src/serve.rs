@@ -9,7 +9,7 @@ use std::time::Duration;
 use firmware_protocol::{Board, Device, Instant};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-pub use lines::serve_bench;
+pub use lines::{serve_bench, serve_bench_at};
 
 use crate::wire::{Wire, Wired};
 

@@ -3,7 +3,7 @@
 
 use spanned_toml::{Bounds, Problem, Table};
 
-use crate::{AxisFlaws, DetectorFlaws, Misalignment};
+use crate::{AxisFlaws, DetectorFlaws, DeviceFault, Misalignment};
 
 /// What the rig file can't know of a real rig. Everything absent is an effect absent; but limit
 /// switches every rig has.
@@ -25,6 +25,8 @@ pub struct Simulated {
     pub limit_margin: f64,
     /// What goes wrong on the wire.
     pub faults: LinkFaults,
+    /// What goes wrong with devices of other makes.
+    pub device_faults: Vec<DeviceFault>,
 }
 
 /// What goes wrong on the wire, for tests of the link.
@@ -53,6 +55,7 @@ impl Default for Simulated {
             start: [None; 4],
             limit_margin: LIMIT_MARGIN,
             faults: LinkFaults::default(),
+            device_faults: Vec::new(),
         }
     }
 }
@@ -103,9 +106,19 @@ impl Simulated {
             faults.corrupt_rate = link.number("corrupt_rate", rate)?.unwrap_or(0.0);
             link.finish()?;
         }
+        let device_faults = table.tables("fault")?.into_iter().map(DeviceFault::read);
+        let device_faults = device_faults.collect::<Result<_, _>>()?;
         table.finish()?;
-        let limit_margin = limit_margin.unwrap_or(LIMIT_MARGIN);
-        Ok(Self { dark_current_a, detector, axes, misalignment, start, limit_margin, faults })
+        Ok(Self {
+            dark_current_a,
+            detector,
+            axes,
+            misalignment,
+            start,
+            limit_margin: limit_margin.unwrap_or(LIMIT_MARGIN),
+            faults,
+            device_faults,
+        })
     }
 }
 

@@ -8,7 +8,7 @@
 
 use firmware_protocol::Instant;
 
-use crate::SimulatedBoard;
+use crate::{FaultKind, SimulatedBoard};
 
 /// A simulated device that speaks another make's language. Calls come with a time that never goes
 /// back; before each of them all twins of the bench have been asked to [`follow`](Twin::follow).
@@ -27,6 +27,16 @@ pub trait Twin: Send {
 
     /// When it wants to be woken; `None` while nothing is due. May change with every other call.
     fn poll_timeout(&self, board: &SimulatedBoard) -> Option<Instant>;
+
+    /// How many moves it has set out on since it was switched on, or readings it was asked for.
+    fn deeds(&self) -> u32 {
+        0
+    }
+
+    /// Something goes wrong in it, now. What it can't suffer it takes no notice of.
+    fn fail(&mut self, board: &mut SimulatedBoard, now: Instant, fault: FaultKind) {
+        let _ = (board, now, fault);
+    }
 
     /// What it puts on the wire now; empty when it has nothing to say. Asked after every other
     /// call.

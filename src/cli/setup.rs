@@ -13,6 +13,7 @@ use super::args::{EffectArgs, RigArgs};
 use super::failure::Failure;
 use super::inputs::{BUILT_IN, Inputs, beside};
 use super::nominal::{misaligned, nominal};
+use super::twins;
 use crate::journal::{EffectWishes, Input, InputRole, Reader};
 use crate::plan::{Plan, PlanHash, Region, Sequence};
 use crate::rig::Rig;
@@ -23,6 +24,7 @@ use crate::study::adaptive::Account;
 pub(crate) struct Stage {
     pub(crate) compiled: Arc<sim::Compiled>,
     pub(crate) faults: sim::LinkFaults,
+    pub(crate) device_faults: Vec<sim::DeviceFault>,
     pub(crate) seed: u64,
 }
 
@@ -320,6 +322,7 @@ fn read_stage(
         }
     };
     super::run::check_simulated(plan)?;
+    twins::check_faults(rig, &rig.devices.as_ref().map(twins::of).unwrap_or_default())?;
     Ok(Some(stage_at(inputs, &path, rig, terms)?))
 }
 
@@ -356,10 +359,10 @@ fn compile(scene: sim::Scene, rig: &Rig, terms: &sim::Terms) -> Result<Stage, Fa
     let simulated = root.table("simulated")?.map(sim::Simulated::read).transpose()?;
     let mut simulated = simulated.unwrap_or_default();
     simulated.misalignment = misaligned(rig, simulated.misalignment);
-    let faults = simulated.faults;
+    let (faults, device_faults) = (simulated.faults, simulated.device_faults.clone());
     let compiled = sim::compile(scene, nominal(rig), simulated, terms)
         .map_err(|error| refused(&error, rig))?;
-    Ok(Stage { compiled: Arc::new(compiled), faults, seed: terms.seed })
+    Ok(Stage { compiled: Arc::new(compiled), faults, device_faults, seed: terms.seed })
 }
 
 /// Where what can't be compiled was written: in the rig's file, in the scene's, or on the command line.

@@ -64,14 +64,17 @@ impl SimulatedDevice {
 #[derive(Debug, Clone)]
 pub(crate) struct SimulatedDevices {
     streams: mpsc::UnboundedSender<(usize, DuplexStream)>,
-    lines: usize,
+    /// What each line's device is, in words.
+    names: Vec<String>,
 }
 
 impl SimulatedDevices {
     /// Switches them on around one board, as a task of the current runtime.
     pub(crate) fn switch_on(stage: &Stage, devices: &Devices) -> Self {
         let (streams, mut waiting) = mpsc::unbounded_channel::<(usize, DuplexStream)>();
-        let mut bench = twins::bench(stage, &twins::of(devices), OWN_BOOT);
+        let there = twins::of(devices);
+        let mut bench = twins::bench(stage, &there, OWN_BOOT);
+        let names = there.iter().map(|line| format!("simulated {}", line.name())).collect();
         let lines = bench.lines();
         tokio::spawn(async move {
             let boot = Instant::now();
@@ -81,24 +84,25 @@ impl SimulatedDevices {
                 if plugged.len() == lines {
                     let streams = std::mem::take(&mut plugged).into_values().collect();
                     // Streams that end are a host that left; the next one may come.
-                    let _ = sim::serve_bench(streams, &mut bench, boot).await;
+                    let notice = |happened| note(&twins::note_of(happened, &there));
+                    let _ = sim::serve_bench(streams, &mut bench, boot, notice).await;
                 }
             }
         });
-        Self { streams, lines }
+        Self { streams, names }
     }
 
     /// Links to them, as often as they are asked for. Those before must have been dropped.
     pub(crate) fn openers(self) -> Openers {
-        let opener_to = |line: usize| {
+        let opener_to = |(line, name): (usize, String)| {
             let streams = self.streams.clone();
             opener(move || {
                 let (host, device) = duplex(STREAM_BYTES);
                 let _ = streams.send((line, device));
-                std::future::ready(Ok(Link::new("simulated device", host)))
+                std::future::ready(Ok(Link::new(&name, host)))
             })
         };
-        Openers((0..self.lines).map(opener_to).collect())
+        Openers(self.names.into_iter().enumerate().map(opener_to).collect())
     }
 }
 
@@ -120,6 +124,7 @@ pub(crate) fn sim(args: &SimArgs) -> Outcome {
     let stage = stage_at(&mut inputs, scene, &rig, &args.effects.terms(args.rig.seed))?;
     let lines = twins::wanted(&args.makes, &rig);
     let lines = lines.map(|lines| at_baud(lines, args.baud));
+    twins::check_faults(&rig, lines.as_deref().unwrap_or_default())?;
     let expected = lines.as_ref().map_or(1, Vec::len);
     if !args.pty.is_empty() && args.pty.len() != expected {
         return Err(Failure::with_help(
@@ -184,14 +189,21 @@ async fn serve_on_pty(args: &SimArgs, stage: &Stage, baud: u32) -> Outcome {
 
 async fn serve_twins(args: &SimArgs, stage: &Stage, lines: &[twins::Line]) -> Outcome {
     let mut stop = stop_signals()?;
-    let mut terminals = Vec::new();
+    let mut terminals: Vec<Option<sim::Pty>> = Vec::new();
     for (place, line) in lines.iter().enumerate() {
-        terminals.push(terminal(args.pty.get(place))?);
+        terminals.push(Some(terminal(args.pty.get(place))?));
         note(&format!("a simulated {} at {} baud", line.name(), line.baud));
     }
     note("Ctrl-C switches them off");
     let mut bench = twins::bench(stage, lines, draw_session());
-    let served = sim::serve_bench(terminals, &mut bench, Instant::now());
+    // A plug that was pulled and comes back is another terminal.
+    let open = |place: usize| match terminals.get_mut(place).and_then(Option::take) {
+        Some(terminal) => Ok(terminal),
+        None => terminal(args.pty.get(place))
+            .map_err(|failure| std::io::Error::other(failure.text().to_owned())),
+    };
+    let notice = |happened| note(&twins::note_of(happened, lines));
+    let served = sim::serve_bench_at(open, &mut bench, Instant::now(), notice);
     serve_until_stopped(&mut stop, served).await
 }
 

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::args::Make;
+use super::failure::Failure;
 use super::setup::Stage;
 use super::simulated::wire;
 use crate::rig::{
@@ -40,6 +41,33 @@ impl Line {
             Device::Meter(sim::MeterMake::Keithley6485) => "Keithley 6485",
             Device::Meter(sim::MeterMake::Newport1830C) => "Newport 1830-C",
             Device::Meter(sim::MeterMake::ThorlabsPm100) => "Thorlabs PM100D",
+        }
+    }
+
+    /// Its driver's word in a rig file.
+    const fn driver(&self) -> &'static str {
+        match &self.device {
+            Device::Axes(link) => match link.driver {
+                AxesDriver::Dynamixel { .. } => "dynamixel",
+                AxesDriver::Grbl { .. } => "grbl",
+            },
+            Device::Meter(sim::MeterMake::Keithley6485) => "keithley-6485",
+            Device::Meter(sim::MeterMake::Newport1830C) => "newport-1830c",
+            Device::Meter(sim::MeterMake::ThorlabsPm100) => "thorlabs-pm100",
+        }
+    }
+
+    /// Whether this can go wrong with it.
+    fn suffers(&self, kind: sim::FaultKind) -> bool {
+        match kind {
+            sim::FaultKind::Alarm => self.driver() == "grbl",
+            sim::FaultKind::Overheating(id) | sim::FaultKind::Overload(id) => match &self.device {
+                Device::Axes(AxesLink { driver: AxesDriver::Dynamixel { ids, .. }, .. }) => {
+                    ids.contains(&id)
+                }
+                _ => false,
+            },
+            _ => true,
         }
     }
 
@@ -113,6 +141,51 @@ fn by_name(make: Make, rig: &Rig) -> Line {
     }
 }
 
+/// Every fault that the rig file plans must happen to a device that is there and can suffer it.
+pub(super) fn check_faults(rig: &Rig, lines: &[Line]) -> Result<(), Failure> {
+    let Some(simulated) = rig.document().root().table("simulated")? else { return Ok(()) };
+    let faults = simulated.tables("fault")?.into_iter().map(sim::DeviceFault::read);
+    for (table, fault) in simulated.tables("fault")?.into_iter().zip(faults) {
+        let fault = fault?;
+        let device = &fault.device;
+        let refused = |key: &str, what: String, expected: String| {
+            Failure::from(table.problem(key, &what, &expected, "correct it, or remove this fault"))
+        };
+        let Some(line) = lines.iter().find(|line| line.driver() == *device) else {
+            let there: Vec<&str> = lines.iter().map(Line::driver).collect();
+            let there = if there.is_empty() {
+                "none: gonio's own controller has [simulated.link]".to_owned()
+            } else {
+                there.join(", ")
+            };
+            let what = format!("{device}: no such device is simulated");
+            return Err(refused("device", what, there));
+        };
+        if !line.suffers(fault.kind) {
+            let what = format!("{}: nothing that a {} suffers", fault.kind, line.name());
+            let expected = "alarm of a grbl, overload and overheating of a bus's servo".to_owned();
+            return Err(refused("kind", what, expected));
+        }
+    }
+    Ok(())
+}
+
+/// What happened to a device, for a person who looks on.
+pub(super) fn note_of(note: sim::Note, lines: &[Line]) -> String {
+    use sim::Note as N;
+    let seconds = |at: firmware_protocol::Instant| {
+        std::time::Duration::from_micros(at.micros()).as_secs_f64()
+    };
+    let name = |line: usize| lines.get(line).map_or("device", Line::name);
+    match note {
+        N::Began(at, line, kind) => format!("{:.3} s: the {}: {kind}", seconds(at), name(line)),
+        N::Ended(at, line, kind) => {
+            format!("{:.3} s: the {}: no longer {kind}", seconds(at), name(line))
+        }
+        N::AtRest(since) => format!("{:.3} s: the axes stand", seconds(since)),
+    }
+}
+
 /// The devices around one board.
 pub(super) fn bench(stage: &Stage, lines: &[Line], boot: u32) -> sim::Bench {
     let board = sim::SimulatedBoard::new(Arc::clone(&stage.compiled), boot);
@@ -139,6 +212,11 @@ pub(super) fn bench(stage: &Stage, lines: &[Line], boot: u32) -> sim::Bench {
             Device::Meter(make) => {
                 bench.plug(sim::MeterTwin::new(*make), wire);
             }
+        }
+    }
+    for fault in &stage.device_faults {
+        if let Some(line) = lines.iter().position(|line| line.driver() == fault.device) {
+            bench.plan_fault(line, fault.clone());
         }
     }
     bench

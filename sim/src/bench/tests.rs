@@ -126,7 +126,7 @@ async fn a_line_that_ends_leaves_the_others() {
         drop(first);
         heard
     };
-    let served = crate::serve_bench(vec![first_far, second_far], &mut bench, boot);
+    let served = crate::serve_bench(vec![first_far, second_far], &mut bench, boot, |_| {});
     let (served, heard) = tokio::join!(served, host);
     served.unwrap();
     assert_eq!(&heard, b"HELLO");

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 
 use firmware_protocol::{Board as _, BoardFault, Instant};
 
-use crate::{SimulatedBoard, Twin};
+use crate::{FaultKind, SimulatedBoard, Twin};
 use servo::{CRC_ERROR, INSTRUCTION_ERROR, OVERHEATING, OVERLOAD, Servo};
 pub use servo::{ServoLoad, ServoSetting};
 use wire::{BROADCAST, Ear, Received, status, status_together};
@@ -38,6 +38,8 @@ pub struct DynamixelBus {
     now: Instant,
     /// Servos whose cable is out.
     cut: Vec<u8>,
+    /// Instructions that made servos set out.
+    moves: u32,
 }
 
 impl DynamixelBus {
@@ -51,6 +53,7 @@ impl DynamixelBus {
             said: Vec::new(),
             now: Instant::ZERO,
             cut: Vec::new(),
+            moves: 0,
         }
     }
 
@@ -245,7 +248,10 @@ impl Twin for DynamixelBus {
     fn handle_bytes(&mut self, board: &mut SimulatedBoard, now: Instant, bytes: &[u8]) {
         for byte in bytes {
             if let Some(received) = self.ear.hear(*byte) {
+                let count = |servos: &[Servo]| servos.iter().map(|servo| servo.moves).sum::<u32>();
+                let before = count(&self.servos);
                 self.obey(board, now, &received);
+                self.moves += u32::from(count(&self.servos) != before);
             }
         }
     }
@@ -271,6 +277,21 @@ impl Twin for DynamixelBus {
         let servos = self.servos.iter().filter_map(|servo| servo.next(self.now));
         let says = self.waiting.front().map(|(at, _)| *at);
         servos.chain(says).chain(board.wake_at()).min()
+    }
+
+    fn deeds(&self) -> u32 {
+        self.moves
+    }
+
+    fn fail(&mut self, _board: &mut SimulatedBoard, now: Instant, fault: FaultKind) {
+        let (id, error) = match fault {
+            FaultKind::Overheating(id) => (id, OVERHEATING),
+            FaultKind::Overload(id) => (id, OVERLOAD),
+            _ => return,
+        };
+        for servo in self.servos.iter_mut().filter(|servo| servo.id() == id) {
+            servo.fail(now, error);
+        }
     }
 
     fn poll_transmit(&mut self) -> Vec<u8> {

@@ -137,7 +137,8 @@ pub(super) struct Servo {
     heard: Instant,
     /// What a `REG_WRITE` left for the next action.
     registered: Option<(u16, Vec<u8>)>,
-    moves: u32,
+    /// How often it set out for a goal.
+    pub(super) moves: u32,
     /// Raised in the n-th move from now on, as hardware would by itself.
     pub(super) fails_in: Option<(u32, u8)>,
 }

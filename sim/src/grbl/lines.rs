@@ -162,6 +162,7 @@ impl GrblTwin {
         let lengths_per_s = (self.motion == 1 && length > 0.0).then(|| self.feed / 60.0 / length);
         self.planned.clone_from(&target);
         self.blocks.push_back(Block { target, lengths_per_s });
+        self.moves = self.moves.wrapping_add(1);
         if self.state == State::Idle {
             self.set_out(board, now);
         }

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 
 use firmware_protocol::{Board as _, Instant, Shutter};
 
-use crate::{Nominal, SimulatedBoard, Twin};
+use crate::{FaultKind, Nominal, SimulatedBoard, Twin};
 use homing::Homing;
 use motion::{Block, Leg, Limits};
 
@@ -113,6 +113,8 @@ pub struct GrblTwin {
     modes: Modes,
     outputs: Outputs,
     reports: u32,
+    /// Lines that it took for a move.
+    moves: u32,
     /// Bytes that found the buffer full.
     lost: u64,
     outgoing: Vec<u8>,
@@ -146,6 +148,7 @@ impl GrblTwin {
             modes: Modes::default(),
             outputs: Outputs::default(),
             reports: 0,
+            moves: 0,
             lost: 0,
             outgoing: Vec::new(),
             boots_at: None,
@@ -185,8 +188,8 @@ impl GrblTwin {
     fn act_at_once(&mut self, board: &mut SimulatedBoard, now: Instant, byte: u8) -> bool {
         match byte {
             b'?' => {
-                // It looks at nothing else while it homes.
-                if self.homing.is_none() {
+                // It looks at nothing else while it homes, nor where only a reset helps.
+                if self.homing.is_none() && !matches!(self.state, State::Alarm(Some(_))) {
                     self.report(now);
                 }
             }
@@ -377,6 +380,16 @@ impl Twin for GrblTwin {
         let homing = self.homing.as_ref().map(Homing::wake);
         let switch = board.wake_at().filter(|_| self.is_moving() && self.homing.is_none());
         [reads, ends, pause, homing, switch, self.boots_at].into_iter().flatten().min()
+    }
+
+    fn deeds(&self) -> u32 {
+        self.moves
+    }
+
+    fn fail(&mut self, _board: &mut SimulatedBoard, now: Instant, fault: FaultKind) {
+        if fault == FaultKind::Alarm {
+            self.alarm(now, 1);
+        }
     }
 
     fn poll_transmit(&mut self) -> Vec<u8> {

@@ -207,6 +207,10 @@ impl Axis {
         }
     }
 
+    pub(crate) const fn setpoint_counts(&self) -> f64 {
+        self.setpoint_counts
+    }
+
     pub(crate) fn begin_motion(&mut self, now: Instant, towards_counts: f64) {
         let [from, towards] =
             [self.setpoint_counts, towards_counts].map(|counts| self.origin_counts + counts);

@@ -45,6 +45,8 @@ pub struct MeterTwin {
     /// What waits until the readings are done.
     waiting: VecDeque<String>,
     zero_ends: Option<Instant>,
+    /// How often it was asked for readings.
+    asked: u32,
     /// How many more readings it answers; `None`: it never stalls.
     stalls_after: Option<u32>,
 }
@@ -94,6 +96,7 @@ impl MeterTwin {
             integrating: None,
             waiting: VecDeque::new(),
             zero_ends: None,
+            asked: 0,
             stalls_after: None,
         }
     }
@@ -152,6 +155,7 @@ impl MeterTwin {
             *left = left.saturating_sub(1);
         }
         let gain = self.settings.gain.unwrap_or_else(|| lowest_that_holds(board, now));
+        self.asked += u32::from(is_asked);
         // What is only taken to be zeroed is no reading: those that follow keep their names.
         let reading = if is_asked { board.name_reading(gain) } else { 0 };
         let illumination = Illumination { reading, gain, shutter: board.shutter() };
@@ -285,6 +289,10 @@ impl Twin for MeterTwin {
     fn poll_timeout(&self, _board: &SimulatedBoard) -> Option<Instant> {
         let next = self.integrating.as_ref().map(|integrating| integrating.next);
         [next, self.zero_ends].into_iter().flatten().min()
+    }
+
+    fn deeds(&self) -> u32 {
+        self.asked
     }
 
     fn poll_transmit(&mut self) -> Vec<u8> {
