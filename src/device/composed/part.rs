@@ -161,6 +161,7 @@ impl Composer {
     pub(super) fn fault(&mut self, now: Instant, fault: NamedFault) {
         let cause = fault.cause;
         if self.is_clearing() {
+            self.say(DeviceEvent::Fault(fault));
             self.not_cleared(cause);
             return;
         }

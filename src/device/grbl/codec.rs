@@ -137,8 +137,11 @@ fn parse(line: &str) -> Option<Message> {
         let value = value.split(' ').next()?.parse::<f64>().ok().filter(|v| v.is_finite())?;
         return Some(Message::Setting(number, value));
     }
-    if line.starts_with('>') {
-        return Some(Message::StartUp);
+    if let Some(block) = line.strip_prefix('>') {
+        let (_, answer) = block.split_once(':')?;
+        let error = answer.strip_prefix("error:").map(str::parse::<u8>);
+        let is_answer = answer == "ok" || error.is_some_and(|number| number.is_ok());
+        return is_answer.then_some(Message::StartUp);
     }
     let words: Vec<&str> = line.split(' ').collect();
     match words.as_slice() {
@@ -279,6 +282,7 @@ mod tests {
             "error:x\n",
             "ALARM:\n",
             "$110=5x0\n",
+            ">Idle|MPos:0.000,0.000,0.000|FS:0,0>\n",
             "\x01\x02\x7f\n",
         ] {
             assert_eq!(messages(bad.as_bytes()), [Message::Garbled], "{bad:?}");

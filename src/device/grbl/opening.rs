@@ -21,6 +21,8 @@ const FIRST_BUFFER: usize = 64;
 pub(super) struct Step {
     until: Instant,
     stage: Stage,
+    /// Nothing else helped.
+    was_reset: bool,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -41,25 +43,26 @@ impl Grbl {
         self.offset = None;
         self.stream = Stream::new(FIRST_BUFFER);
         self.tries = 0;
-        let until = match (&self.task, banner) {
-            (Task::Opening(step), Some(_)) => step.until.max(now + TALK),
-            _ => now + PATIENCE,
+        let (until, was_reset) = match (&self.task, banner) {
+            (Task::Opening(step), Some(_)) => (step.until.max(now + TALK), step.was_reset),
+            _ => (now + PATIENCE, false),
         };
         if let Some(version) = banner.filter(|version| !version.starts_with("1.1")) {
             let what = format!("it is grbl {version}");
             return self.refuse((what, "grbl 1.1".to_owned(), "flash grbl 1.1".to_owned()));
         }
-        self.go(Stage::Greeting, until);
+        self.task = Task::Opening(Step { until, stage: Stage::Greeting, was_reset });
         self.ask(now);
     }
 
     fn go(&mut self, stage: Stage, until: Instant) {
-        self.task = Task::Opening(Step { until, stage });
+        let was_reset = matches!(self.task, Task::Opening(Step { was_reset: true, .. }));
+        self.task = Task::Opening(Step { until, stage, was_reset });
     }
 
     /// A report came.
     pub(super) fn open_on(&mut self, now: Instant, step: Step, report: &Report) {
-        let Step { until, stage } = step;
+        let Step { until, stage, .. } = step;
         match (stage, report.state) {
             (Stage::Greeting, State::Run | State::Home) => {
                 self.urgent.push(byte::HOLD);
@@ -128,8 +131,19 @@ impl Grbl {
 
     /// No answer in time.
     pub(super) fn open_again(&mut self, now: Instant, step: Step) {
-        let Step { until, stage } = step;
-        if now >= until {
+        let Step { until, stage, was_reset } = step;
+        let is_talking = matches!(stage, Stage::Asking(_) | Stage::Listing(_));
+        if !was_reset && self.garbled == 0 && (now >= until || is_talking) {
+            // After a limit's alarm it answers nothing, or nothing but `?`, until it is reset. At
+            // rest a reset loses nothing, and a board that does not answer is not moving, or homes.
+            self.stream.clear();
+            self.urgent = vec![byte::RESET];
+            let until = now + PATIENCE;
+            self.task = Task::Opening(Step { until, stage: Stage::Greeting, was_reset: true });
+            self.ask_at = Some(now + ANSWER_WITHIN);
+            return;
+        }
+        if now >= until || (was_reset && is_talking) {
             let heard = match (self.bytes, self.garbled) {
                 (0, _) => "nothing was heard; is it powered, and is this its port?".to_owned(),
                 (bytes, garbled) if garbled > 0 || self.board.version.is_none() => format!(

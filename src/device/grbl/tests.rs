@@ -170,7 +170,10 @@ fn another_version_a_wrong_map_and_a_wrong_mode_are_refused_before_anything_move
 fn silence_and_garbage_are_told_apart() {
     let mut silent = Talk::new(&['X']);
     let sent = silent.wait();
-    assert!(sent.len() > 5 && sent.bytes().all(|byte| byte == b'?'), "{sent}");
+    // A board that a limit locked is as silent, and wakes by a reset.
+    let resets = sent.bytes().filter(|byte| *byte == 0x18).count();
+    let others = sent.bytes().filter(|byte| !matches!(byte, 0x18 | b'?')).count();
+    assert!(sent.len() > 5 && (resets, others) == (1, 0), "{sent}");
     assert!(silent.silence().contains("nothing was heard"));
 
     let mut garbled = Talk::new(&['X']);
@@ -178,6 +181,24 @@ fn silence_and_garbage_are_told_apart() {
     garbled.wait();
     let words = garbled.silence();
     assert!(words.contains("6 bytes") && words.contains("baud"), "{words}");
+}
+
+#[test]
+fn a_board_that_a_limit_has_locked_is_reset_once() {
+    // As grblHAL does it: it reports, and answers no line.
+    let mut talk = Talk::new(&['X']);
+    talk.says("<Alarm|MPos:1.000,0.000,0.000|FS:0,0>\r\n");
+    assert_eq!(talk.sent(), "\n$I\n");
+    talk.tick();
+    assert_eq!(talk.sent(), "\x18");
+    talk.says("\r\nGrbl 1.1h ['$' for help]\r\n[MSG:'$H'|'$X' to unlock]\r\n");
+    assert_eq!(talk.sent(), "?");
+    talk.says("<Alarm|MPos:1.000,0.000,0.000|FS:0,0>\r\n");
+    assert_eq!(talk.sent(), "\n$I\n");
+    // One that answers nothing still is not asked for ever.
+    talk.tick();
+    assert!(talk.silence().contains("no answer from a grbl"));
+    assert_eq!(talk.grbl.poll_timeout(), None);
 }
 
 #[test]

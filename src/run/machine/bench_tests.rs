@@ -245,11 +245,15 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn new(program: Program, on_fault: OnFault) -> Self {
+        Self::on(Device { boot_id: 1, ..Device::default() }, program, on_fault)
+    }
+
+    pub(super) fn on(device: Device, program: Program, on_fault: OnFault) -> Self {
         let rig = rig();
         let setup = Setup { rig: rig.clone(), home_first: true, on_fault };
         let mut bench = Self {
             machine: Machine::new(setup, program),
-            device: Device { boot_id: 1, ..Device::default() },
+            device,
             rig,
             taken: Vec::new(),
             states: Vec::new(),

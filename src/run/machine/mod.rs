@@ -251,8 +251,12 @@ impl Machine {
             _ => Position::Untrusted(Doubt::NotHomed),
         });
         match (self.state, fault) {
-            // What an earlier session left; starting a run is reason enough to clear it.
-            (State::Idle, None | Some(Cause::LeaseExpired | Cause::Stopped)) => {
+            // What an earlier session left: whoever starts a run by hand has seen it, and its
+            // device says so if it persists. Elsewhere somebody must say continue.
+            (State::Idle, fault)
+                if self.setup.on_fault == OnFault::Finish
+                    || matches!(fault, None | Some(Cause::LeaseExpired | Cause::Stopped)) =>
+            {
                 match self.wish.take() {
                     Some((After::Pause, _)) => self.go(State::Paused),
                     Some((After::Finish(outcome), _)) => self.finish(outcome),

@@ -88,6 +88,18 @@ fn a_fault_ends_a_run_that_nobody_watches() {
 }
 
 #[test]
+fn what_an_earlier_run_ended_in_is_cleared_by_whoever_starts_one_by_hand_alone() {
+    let latched = || Device { boot_id: 1, latched: Some(Cause::Stalled(1)), ..Device::default() };
+    let mut by_hand = Bench::on(latched(), plain(20), OnFault::Finish);
+    by_hand.settle();
+    assert_eq!((by_hand.outcome, by_hand.taken.len()), (Some(Outcome::Complete), 20));
+    let mut queued = Bench::on(latched(), plain(20), OnFault::Wait);
+    queued.settle();
+    assert_eq!(queued.machine.fault(), Some(&Fault::Device(Cause::Stalled(1))));
+    assert!(!queued.device.has_moved);
+}
+
+#[test]
 fn a_lost_link_never_moves_by_itself_and_trust_depends_on_the_boot() {
     for restarts in [false, true] {
         let mut bench = Bench::new(plain(20), OnFault::Wait);
