@@ -4,15 +4,10 @@
 
 mod bench;
 
-use std::io::{BufRead as _, BufReader};
-use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
-
 use bench::Bench;
-use gonio::journal::{Order, Reader};
+use bench::twins::{self, Devices};
 
-/// Whatever takes longer has stuck.
-const PATIENCE: Duration = Duration::from_mins(2);
+const DRIVERS: [&str; 2] = ["dynamixel", "keithley-6485"];
 
 struct Samples {
     heads: Vec<String>,
@@ -72,90 +67,24 @@ fn the_plan_reads_the_same_through_servos_and_a_meter() {
     }
 }
 
-/// A process that does not outlive its test.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// The small plan on a rig whose devices are at ports; the simulated ones' file beside it.
-fn at_ports() -> Bench {
-    let bench = small();
-    let simulated = bench.text("rig.toml");
-    let (real, _) = simulated.split_once("\n[simulated]").unwrap();
-    let port = |name: &str| format!("\nport = \"{}\"", bench.path(name).display());
-    let real = real
-        .replace("kind = \"simulated\"", "kind = \"devices\"")
-        .replace("driver = \"dynamixel\"", &format!("driver = \"dynamixel\"{}", port("servos")))
-        .replace(
-            "driver = \"keithley-6485\"",
-            &format!("driver = \"keithley-6485\"{}", port("meter")),
-        );
-    bench.having("simulated.toml", simulated).having("rig.toml", real).with(
-        "plan.toml",
-        "scene = \"scene.toml\"\n",
-        "",
-    )
-}
-
-/// Both devices switched on.
-fn devices(bench: &Bench) -> Process {
-    let arguments =
-        ["sim", "--rig", "simulated.toml", "--scene", "scene.toml", "--pty", "servos,meter"];
-    let mut command = bench.command(&arguments);
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let mut sim = Process(child);
-    let mut said = BufReader::new(sim.0.stdout.take().unwrap()).lines();
-    for link in ["servos", "meter"] {
-        assert_eq!(said.next().unwrap().unwrap(), link);
-    }
-    sim
-}
-
-/// How many readings are committed; none while there is no journal yet.
-fn committed(bench: &Bench) -> usize {
-    let reader = Reader::open(&bench.path("run/run.sqlite"));
-    reader.and_then(|reader| reader.readings(Order::Id)).map_or(0, |readings| readings.len())
-}
-
 #[test]
 fn over_terminals_a_killed_run_is_resumed_and_a_meter_that_is_unplugged_ends_it() {
-    let bench = at_ports();
-    let sim = devices(&bench);
-    // Both languages are recognised, and nothing moves.
-    let mut run = bench.command(&["run", "plan.toml", "--out", "run"]);
-    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-    let deadline = Instant::now() + PATIENCE;
-    while committed(&bench) < 3 {
-        assert!(Instant::now() < deadline && run.0.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    let bench = twins::at_ports(small(), &DRIVERS);
+    let sim = Devices::switched_on(&bench, &DRIVERS);
+    let mut run = twins::start(&bench, &["run", "plan.toml", "--out", "run"]);
+    twins::await_readings(&bench, &mut run, 3);
     // No last words: the servos stop by themselves.
     run.0.kill().unwrap();
     run.0.wait().unwrap();
-    let before = committed(&bench);
-    let mut run = bench.command(&["resume", "run"]);
-    let mut run = Process(run.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap());
-    while committed(&bench) < before + 2 {
-        assert!(Instant::now() < deadline && run.0.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    let before = twins::committed(&bench).len();
+    let mut run = twins::start(&bench, &["resume", "run"]);
+    twins::await_readings(&bench, &mut run, before + 2);
     // All plugs out.
     drop(sim);
-    let code = run.0.wait().unwrap().code();
-    assert_eq!(code, Some(1));
-    let _sim = devices(&bench);
-    bench.gonio(&["resume", "run"]).well();
-    let reader = Reader::open(&bench.path("run/run.sqlite")).unwrap();
-    let ids = reader.readings(Order::Id).unwrap().into_iter().map(|reading| reading.id);
-    // Those beyond are the references that a resume begins with.
-    let ids: Vec<u32> = ids.filter(|id| *id < 1 << 31).collect();
-    let count = u32::try_from(ids.len()).unwrap();
-    assert!(count > 10 && ids == (0..count).collect::<Vec<_>>(), "each once: {ids:?}");
+    assert_eq!(twins::end(run).code, Some(1));
+    let _sim = Devices::switched_on(&bench, &DRIVERS);
+    twins::end(twins::start(&bench, &["resume", "run"])).well();
+    twins::each_once(&bench);
 }
 
 #[test]

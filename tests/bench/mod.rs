@@ -4,6 +4,7 @@
 #![allow(dead_code)] // each test program uses a part
 
 pub(crate) mod device;
+pub(crate) mod twins;
 
 use std::fs;
 use std::path::{Path, PathBuf};
