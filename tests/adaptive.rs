@@ -140,6 +140,32 @@ fn a_dim_source_is_not_taken_for_a_good_fit() {
     }
 }
 
+/// The lengths of all windows that were flown, milliseconds.
+fn windows_ms(bench: &Bench) -> Vec<f64> {
+    let steps = Reader::open(&bench.path("out/run.sqlite")).unwrap().steps().unwrap();
+    let flown = steps.iter().filter(|step| step.swept.is_some());
+    flown.map(|step| step.dwell.as_secs_f64() * 1e3).collect()
+}
+
+#[test]
+fn sweeps_are_slower_where_light_is_scarce_and_no_slower_where_it_is_not() {
+    let bright = asked(bench(), "0.015");
+    run(&bright);
+    let windows = windows_ms(&bright);
+    assert!(windows.iter().all(|ms| (ms - 25.0).abs() < 1e-9), "{windows:?}");
+    // A reading's noise is a tenth of the radiance: what stands between the sweeps and 5 % is noise.
+    let dim = asked(bench(), "0.05").with("scene.toml", "sr = 100", "sr = 0.008");
+    let (said, summary) = run(&dim);
+    assert!(number(&rounds(&summary)[0]["noise_relative"]) > 0.05, "{said}");
+    let windows = windows_ms(&dim);
+    let long = windows.iter().filter(|ms| **ms >= 100.0).count();
+    assert!(long > 200 && windows.contains(&25.0), "{long} of {}", windows.len());
+    // What lies between them is told apart from noise, so that it does not hold the run up.
+    let last = rounds(&summary).last().unwrap();
+    assert!(number(&last["between_relative"]) < 0.02, "{said}");
+    assert!(truly(&summary) < 0.05, "{said}");
+}
+
 /// With so little time that a round is broken off: what the plan foretells of its first one does not
 /// know how long warming up takes.
 fn short_of_time(bench: Bench, room_s: f64) -> Bench {

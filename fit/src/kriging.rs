@@ -145,6 +145,15 @@ impl Kriging {
         self.mean + self.knots.iter().zip(&self.weights).map(of).sum::<f64>()
     }
 
+    /// The same process, were its values without noise: what is not known then lies between them.
+    /// `None` where they are too close for that.
+    #[must_use]
+    pub fn without_noise(&self) -> Option<Self> {
+        let exact = |knot: &Knot| Knot { variance: 0.0, ..*knot };
+        let knots: Vec<Knot> = self.knots.iter().map(exact).collect();
+        Self::given(&knots, self.lengths, self.mean, self.amplitude)
+    }
+
     /// What is not known at some places, given the values.
     pub fn unknown(&self, places: &[Place]) -> Unknown {
         let (n, m) = (self.knots.len(), places.len());

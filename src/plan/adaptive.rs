@@ -149,7 +149,7 @@ impl Adaptive {
         let meridian = |k: u32| {
             let (x_m, y_m) = places[(k as usize * stride) % places.len()];
             let phi_rad = turn * f64::from(k) / f64::from(count);
-            Meridian { x_m, y_m, phi_rad, theta_rad: range(plan, rig) }
+            Meridian { x_m, y_m, phi_rad, theta_rad: range(plan, rig), window: plan.dwell }
         };
         let checks = (0..first_checks(count)).map(|j| self.check(plan, rig, j));
         (0..count).map(meridian).chain(checks).collect()
@@ -190,6 +190,7 @@ fn evenly(plan: &Plan, rig: &Rig, i: u32, start: f64) -> Meridian {
         y_m: within(plan.region.y_m, part(R3[2])),
         phi_rad: turn * part(R3[0]),
         theta_rad: range(plan, rig),
+        window: plan.dwell,
     }
 }
 

@@ -116,6 +116,24 @@ fn sweeps_go_from_one_to_the_nearest_and_play_is_respected() {
 }
 
 #[test]
+fn paces_to_choose_from_are_as_fast_as_anything_bears_or_slower() {
+    let rig = rig();
+    // 12 degrees bear windows of 2.4 degrees: the axis limits those of 25 ms already, and twice as long
+    // ones are nearly as fast.
+    let paces = plan().sweep_paces(&rig).unwrap();
+    let ms: Vec<u128> = paces.iter().map(|pace| pace.window.as_millis()).collect();
+    assert_eq!(ms, [25, 50, 100, 200, 400, 800]);
+    assert!(paces.windows(2).all(|pair| pair[1].slower_than(&pair[0]) > 1.1), "{paces:?}");
+    // Narrower ones bear less: the axis could do it faster, and does with shorter windows.
+    let fine = read(&SCHEDULE.replace("= 12", "= 6"), STOP).unwrap();
+    let paces = fine.sweep_paces(&rig).unwrap();
+    assert_eq!(paces[0].window.as_millis(), 25);
+    assert_eq!(paces[1].window.as_millis(), 21, "{paces:?}");
+    assert!(paces[1].slower_than(&paces[0]) < 0.95, "{paces:?}");
+    assert!((paces[2].slower_than(&paces[0]) - 2.0).abs() < 0.01, "{paces:?}");
+}
+
+#[test]
 fn an_arm_that_does_not_reach_over_flies_on_one_side() {
     let (plan, mut rig) = (plan(), rig());
     rig.axes[0].travel.0 = -0.1;

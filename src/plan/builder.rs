@@ -117,7 +117,7 @@ impl<'p> Builder<'p> {
                 Some(route) => (route.via, route.settle),
                 None => (None, Duration::ZERO),
             };
-            let step = step(id, kind, place, self.gain, self.plan.dwell);
+            let step = step(id, kind, place, self.gain, flight.window);
             self.steps.push(Step { via, settle, swept: Some(swept), ..step });
         }
     }

@@ -4,6 +4,7 @@
 //! Why they are wanted is not known here.
 
 use std::f64::consts::PI;
+use std::time::Duration;
 
 use spanned_toml::Problem;
 
@@ -25,6 +26,8 @@ pub struct Meridian {
     pub phi_rad: f64,
     /// From and to, by the arm's angle; rising.
     pub theta_rad: (f64, f64),
+    /// How long each of its windows is.
+    pub window: Duration,
 }
 
 /// What a round follows.
@@ -47,13 +50,31 @@ pub struct Round {
     pub seconds: f64,
 }
 
-/// What a sweep takes.
+/// What a sweep takes with windows of one length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SweepPace {
+    /// How long a window is.
+    pub window: Duration,
     /// While readings are taken.
     pub seconds_per_rad: f64,
     /// Coming to speed and to rest.
     pub around_s: f64,
+}
+
+/// Paces that differ by less than this part are one.
+const SAME_PACE: f64 = 0.02;
+
+impl SweepPace {
+    /// How many times as long as at another pace the arm is over an angle: so many times less is the
+    /// noise's variance there.
+    pub fn slower_than(&self, other: &Self) -> f64 {
+        self.seconds_per_rad / other.seconds_per_rad
+    }
+
+    /// A sweep over so many radians, from rest to rest.
+    pub fn sweep_s(&self, span_rad: f64) -> f64 {
+        self.around_s + span_rad * self.seconds_per_rad
+    }
 }
 
 impl After {
@@ -160,24 +181,38 @@ impl Plan {
         Ok((builder.steps, targets))
     }
 
-    /// What sweeps take, whatever their length.
-    pub fn sweep_pace(&self, rig: &Rig) -> Result<SweepPace, Problem> {
+    /// What sweeps take, whatever their length: the plan's own first, and then others that are as fast
+    /// as anything bears, or slower, with windows to suit.
+    pub fn sweep_paces(&self, rig: &Rig) -> Result<Vec<SweepPace>, Problem> {
+        let mut paces = vec![self.sweep_pace(rig, self.dwell)?];
+        // A window that can't be flown is none to choose; nor is one that is as fast as another.
+        let others = sweep::windows(self, rig).into_iter();
+        for pace in others.filter_map(|window| self.sweep_pace(rig, window).ok()) {
+            let is_alike = |known: &SweepPace| (pace.slower_than(known) - 1.0).abs() < SAME_PACE;
+            if !paces.iter().any(is_alike) {
+                paces.push(pace);
+            }
+        }
+        Ok(paces)
+    }
+
+    fn sweep_pace(&self, rig: &Rig, window: Duration) -> Result<SweepPace, Problem> {
         let most = self.region.theta_max_rad;
         let from = if sweep::reaches_over(self, rig) { -most } else { 0.0 };
-        let flights = sweep::cut(self, rig, (from, most))?;
+        let flights = sweep::cut(self, rig, (from, most), window)?;
         let Some((flight, windows)) = flights.first().copied() else {
-            return Ok(SweepPace { seconds_per_rad: 0.0, around_s: 0.0 });
+            return Ok(SweepPace { window, seconds_per_rad: 0.0, around_s: 0.0 });
         };
         let motion = rig.flight(flight).ok();
         let around_us = motion.map_or(0, |motion| motion.before_us() + motion.ramp_us());
         let span = rig.axes[0].position(f64::from(flight.travel.0[0]) * f64::from(windows));
         let flown_s = flight.window.as_secs_f64() * f64::from(windows);
-        Ok(SweepPace { seconds_per_rad: flown_s / span, around_s: around_us as f64 / 1e6 })
+        Ok(SweepPace { window, seconds_per_rad: flown_s / span, around_s: around_us as f64 / 1e6 })
     }
 
     /// The flights of a sweep, upwards.
     fn block(&self, rig: &Rig, meridian: Meridian) -> Result<Vec<Line>, Problem> {
-        let Meridian { x_m, y_m, phi_rad, theta_rad } = meridian;
+        let Meridian { x_m, y_m, phi_rad, theta_rad, window } = meridian;
         // Any turn of the table that its travel allows; half a turn changes the arm's sides, which
         // it can only where it reaches over the top.
         let halves = if sweep::reaches_over(self, rig) { 1 } else { 2 };
@@ -190,7 +225,7 @@ impl Plan {
             if half_turns % 2 == 0 { theta_rad } else { (-theta_rad.1, -theta_rad.0) };
         let phi = phi_rad + f64::from(half_turns) * PI;
         let at = rig.counts(AxisPositions([0.0, phi, x_m, y_m]));
-        let flights = sweep::cut(self, rig, (low, high))?;
+        let flights = sweep::cut(self, rig, (low, high), window)?;
         let line = |(flight, windows): (Flight, u16)| {
             let from = Latched([flight.from.0[0], at.0[1], at.0[2], at.0[3]]);
             let flight = Flight { from, windows, ..flight };

@@ -28,6 +28,9 @@ const PART_OF_WIRE: f64 = 0.8;
 const BITS_PER_BYTE: f64 = 10.0;
 /// How much slower a sweep is tried whose run-up has no room.
 const SLOWER: f64 = 0.9;
+/// How often the plan's window is doubled where light is scarce, and up to what.
+const DOUBLINGS: u32 = 5;
+const WINDOW_MAX: Duration = Duration::from_secs(1);
 
 /// One sweep of the plan.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +96,7 @@ pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
     };
     check_wire(plan, rig)?;
     let arc = Arc::of(plan, rig, phi_step_deg);
-    let windows = cut(plan, rig, arc.theta)?;
+    let windows = cut(plan, rig, arc.theta, plan.dwell)?;
     let per_meridian: u64 = windows.iter().map(|(_, count)| u64::from(*count)).sum();
     let count = per_meridian * arc.tables.len() as u64 * u64::from(x_count) * u64::from(y_count);
     if count > u64::from(TARGETS_MAX) {
@@ -189,19 +192,21 @@ fn places(plan: &Plan, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
     places
 }
 
-/// The windows along the arc: upwards, in as many flights as a device can keep windows of.
+/// The windows along the arc, each so long: upwards, in as many flights as a device can keep windows
+/// of.
 pub(super) fn cut(
     plan: &Plan,
     rig: &Rig,
     theta: (f64, f64),
+    window: Duration,
 ) -> Result<Vec<(Flight, u16)>, Problem> {
     let (axis, pinned) = (&rig.axes[0], pinned_speed(plan));
     let mut travel = match pinned {
         Some(speed_deg_per_s) => pinned_travel(plan, rig, speed_deg_per_s)?,
-        None => free_travel(plan, rig),
+        None => free_travel(plan, rig, window),
     };
     loop {
-        let flights = cut_by(plan, rig, theta, travel);
+        let flights = cut_by(rig, theta, travel, window);
         let refused = flights.iter().find_map(|(flight, _)| {
             let up = rig.flight(*flight).err();
             let line = Line { flight: *flight, windows: flight.windows, lowest: 0, is_down: false };
@@ -222,7 +227,7 @@ fn slower(travel: i32) -> i32 {
     ((f64::from(travel) * SLOWER) as i32).max(1)
 }
 
-fn cut_by(plan: &Plan, rig: &Rig, theta: (f64, f64), travel: i32) -> Vec<(Flight, u16)> {
+fn cut_by(rig: &Rig, theta: (f64, f64), travel: i32, window: Duration) -> Vec<(Flight, u16)> {
     let axis = &rig.axes[0];
     let (low, high) = (axis.counts(theta.0), axis.counts(theta.1));
     let span = high.saturating_sub(low).max(1);
@@ -234,7 +239,7 @@ fn cut_by(plan: &Plan, rig: &Rig, theta: (f64, f64), travel: i32) -> Vec<(Flight
     let first = low + (span - windows * travel) / 2;
     let most = i32::try_from(WINDOWS_MAX).unwrap_or(i32::MAX);
     let parts = windows / most + i32::from(windows % most != 0);
-    let lead = lead(rig, axis, travel, plan.dwell);
+    let lead = lead(rig, axis, travel, window);
     let mut flights = Vec::new();
     let mut done = 0;
     for part in 0..parts {
@@ -242,7 +247,7 @@ fn cut_by(plan: &Plan, rig: &Rig, theta: (f64, f64), travel: i32) -> Vec<(Flight
         let count = u16::try_from(end - done).unwrap_or(u16::MAX);
         let from = Latched([first + done * travel, 0, 0, 0]);
         let travel = Latched([travel, 0, 0, 0]);
-        flights.push((Flight { from, travel, window: plan.dwell, lead, windows: count }, count));
+        flights.push((Flight { from, travel, window, lead, windows: count }, count));
         done = end;
     }
     flights
@@ -293,21 +298,49 @@ fn pinned_travel(plan: &Plan, rig: &Rig, speed_deg_per_s: f64) -> Result<i32, Pr
     Ok(travel)
 }
 
-/// As far as the narrowest feature bears, or the axis can.
-fn free_travel(plan: &Plan, rig: &Rig) -> i32 {
+/// As far as the narrowest feature bears, or the axis can in a window.
+fn free_travel(plan: &Plan, rig: &Rig, window: Duration) -> i32 {
+    let axis = &rig.axes[0];
+    let fastest = axis.position(f64::from(axis.counts_per_s())) * window_s(rig, window);
+    whole(axis, borne(plan, rig).min(fastest)).max(1)
+}
+
+/// How far a window may go for the sake of the narrowest feature, radians.
+fn borne(plan: &Plan, rig: &Rig) -> f64 {
     let narrowest_feature_deg = match plan.schedule {
         Schedule::Sweep { narrowest_feature_deg, .. } => narrowest_feature_deg,
         Schedule::Adaptive(Adaptive { narrowest_feature_deg, .. }) => Some(narrowest_feature_deg),
-        _ => return 1,
+        _ => return 0.0,
     };
     let detector = &rig.detector;
     let sigma =
         libm::hypot(detector.pupil_radius_m, detector.spot_radius_m) / (2.0 * detector.distance_m);
     let seen =
         libm::hypot(narrowest_feature_deg.unwrap_or_default().to_radians(), FWHM_PER_SIGMA * sigma);
+    PART_OF_NARROWEST * seen
+}
+
+/// The windows that a sweep may have instead of the plan's: the shortest in which the axis at its
+/// fastest goes as far as the narrowest feature bears, and that the wire carries; and longer ones by
+/// factors of two.
+pub(super) fn windows(plan: &Plan, rig: &Rig) -> Vec<Duration> {
+    let adc = rig.detector.adc;
+    let whole = |seconds: f64| {
+        Duration::from_secs_f64(
+            libm::ceil(seconds * f64::from(adc.rate_hz) - 1e-6) / f64::from(adc.rate_hz),
+        )
+    };
     let axis = &rig.axes[0];
-    let fastest = axis.position(f64::from(axis.counts_per_s())) * window_s(rig, plan.dwell);
-    whole(axis, (PART_OF_NARROWEST * seen).min(fastest)).max(1)
+    let fastest = axis.position(f64::from(axis.counts_per_s()));
+    let shortest = whole((borne(plan, rig) / fastest).max(1.0 / carried_per_s(rig)));
+    let shorter = [shortest].into_iter().filter(|window| *window < plan.dwell);
+    let longer = (1..=DOUBLINGS).map(|n| plan.dwell * (1 << n)).filter(|w| *w <= WINDOW_MAX);
+    shorter.chain(longer).collect()
+}
+
+/// Windows a second that the wire carries.
+fn carried_per_s(rig: &Rig) -> f64 {
+    PART_OF_WIRE * f64::from(rig.link.baud()) / BITS_PER_BYTE / WINDOW_WIRE_MAX as f64
 }
 
 fn pinned_speed(plan: &Plan) -> Option<f64> {
@@ -326,8 +359,7 @@ fn whole(axis: &Axis, units: f64) -> i32 {
 /// Windows must not come faster than the wire takes them.
 pub(super) fn check_wire(plan: &Plan, rig: &Rig) -> Result<(), Problem> {
     let per_s = 1.0 / window_s(rig, plan.dwell);
-    let carried =
-        PART_OF_WIRE * f64::from(rig.link.baud()) / BITS_PER_BYTE / WINDOW_WIRE_MAX as f64;
+    let carried = carried_per_s(rig);
     if per_s <= carried {
         return Ok(());
     }

@@ -4,11 +4,13 @@
 //! in turn says how good that is there. Where the others miss it by more than the interpolation
 //! expects, its surroundings are taken to be as bad: that is what makes the choice go to lobes.
 
+use std::time::Duration;
+
 use fit::kriging::{Kriging, Place, Unknown};
 
 use super::Terms;
 use super::scans::{Nodes, Scan, knots, place};
-use crate::plan::Meridian;
+use crate::plan::{Meridian, SweepPace};
 use crate::rig::{AxisPositions, Latched};
 
 /// Rays at each θ where the field is asked for: half of them candidates' one side, half their other.
@@ -24,15 +26,52 @@ const ALL_SPEAK: f64 = 0.3;
 /// A short sweep has this many nodes at least: less is not worth the way there.
 const NODES_MIN: usize = 3;
 
+/// A part of a candidate's way, in signed nodes.
+struct Part {
+    candidate: usize,
+    from: usize,
+    to: usize,
+    pace: SweepPace,
+    gain: f64,
+    time_s: f64,
+}
+
+impl Part {
+    fn rate(&self) -> f64 {
+        self.gain / self.time_s
+    }
+}
+
+/// What a reading at a node is worth.
+struct Worth {
+    /// If it had no noise, weighted.
+    without_noise: f64,
+    /// Of what is not known there.
+    variance: f64,
+    /// Of a value there at the plan's pace.
+    noise: f64,
+}
+
+impl Worth {
+    /// So many times as slow as by the plan's windows: that pays where the noise counts.
+    fn gain(&self, slower: f64) -> f64 {
+        let whole = self.variance + self.noise / slower;
+        if whole > 0.0 { self.without_noise * self.variance / whole } else { 0.0 }
+    }
+}
+
 /// What the sweeps so far leave open.
 pub(super) struct Between {
     nodes: Nodes,
     candidates: Vec<Meridian>,
     /// Node by node, over candidates' positive sides and then their negative ones.
     unknown: Vec<Unknown>,
+    /// Of a value there at the plan's pace.
     noise: Vec<f64>,
     /// Mean square of the radiance, weighted.
     signal: f64,
+    /// Mean square of the error between the sweeps, had their readings no noise, weighted.
+    open: f64,
     /// Of one reading at a node, weighted.
     noise_square: f64,
     sides: usize,
@@ -51,6 +90,7 @@ impl Between {
             unknown: Vec::new(),
             noise: Vec::new(),
             signal: 0.0,
+            open: 0.0,
             noise_square: 0.0,
             sides,
             candidates,
@@ -64,7 +104,7 @@ impl Between {
 
     fn add(&mut self, terms: &Terms, scans: &[Scan], node: usize) -> Option<()> {
         let theta = self.nodes.thetas_rad[node];
-        let knots = knots(terms, scans, &self.nodes, node);
+        let (knots, noise) = knots(terms, scans, &self.nodes, node);
         let narrowest = terms.adaptive.narrowest_feature_deg.to_radians();
         let arcs = ARCS.map(|arc| (arc * narrowest).min(2.0));
         let field = Kriging::likeliest(&knots, &arcs, &SPANS)?;
@@ -80,21 +120,20 @@ impl Between {
         let weight = self.nodes.weights[node];
         let count = places.len() as f64;
         let square = places.iter().map(|at| field.value(at).powi(2)).sum::<f64>() / count;
-        let noise = knots.iter().map(|knot| knot.variance).sum::<f64>() / knots.len() as f64;
         self.signal += weight * square;
         self.noise_square += weight * noise;
         self.noise.push(noise);
-        self.unknown.push(field.unknown(&places).scaled(&factors));
+        let unknown = field.unknown(&places).scaled(&factors);
+        let exact = field.without_noise().map(|exact| exact.unknown(&places).scaled(&factors));
+        self.open += weight * exact.as_ref().unwrap_or(&unknown).total() / count;
+        self.unknown.push(unknown);
         Some(())
     }
 
     /// The root mean square error that is expected between the sweeps, relative to the radiance's
-    /// root mean square.
+    /// root mean square. Noise is not in it: a fit evens it out, and checks tell how well.
     pub(super) fn relative(&self) -> f64 {
-        let count = (self.candidates.len() * self.sides) as f64;
-        let of = |(unknown, weight): (&Unknown, &f64)| weight * unknown.total() / count;
-        let square: f64 = self.unknown.iter().zip(&self.nodes.weights).map(of).sum();
-        libm::sqrt(square / self.signal)
+        libm::sqrt(self.open / self.signal)
     }
 
     /// The noise of one reading, relative alike.
@@ -115,32 +154,32 @@ impl Between {
         let mut left_s = seconds;
         let mut free: Vec<usize> = (0..self.candidates.len()).collect();
         while left_s > 0.0 && !free.is_empty() {
-            let tried = free.iter().filter_map(|candidate| {
+            let rated = free.iter().flat_map(|candidate| {
                 let way_s = self.way_s(terms, &stands, *candidate);
-                let (from, to, gain, time_s) = self.best_part(terms, *candidate, way_s)?;
-                Some((*candidate, from, to, gain / time_s, time_s))
+                let worths = self.worths(*candidate);
+                let part = |pace| self.best_part(terms, *candidate, &worths, pace, way_s);
+                terms.paces.iter().filter_map(part).collect::<Vec<Part>>()
             });
-            let best = tried.max_by(|a, b| a.3.total_cmp(&b.3));
-            let Some((candidate, from, to, rate, time_s)) = best.filter(|best| best.3 > 0.0) else {
-                break;
-            };
-            debug_assert!(rate.is_finite(), "a sweep takes time");
-            free.retain(|other| *other != candidate);
-            self.learn(candidate, from, to);
-            let whole = self.candidates[candidate];
+            let best = rated.max_by(|a, b| a.rate().total_cmp(&b.rate()));
+            let Some(part) = best.filter(|part| part.rate() > 0.0) else { break };
+            debug_assert!(part.rate().is_finite(), "a sweep takes time");
+            free.retain(|other| *other != part.candidate);
+            self.learn(terms, &part);
+            let whole = self.candidates[part.candidate];
             stands.push(counts(terms, &whole));
-            let theta_rad = self.range(&whole, from, to);
-            chosen.push(Meridian { theta_rad, ..whole });
-            left_s -= time_s;
+            let theta_rad = self.range(&whole, part.from, part.to);
+            chosen.push(Meridian { theta_rad, window: part.pace.window, ..whole });
+            left_s -= part.time_s;
         }
         chosen
     }
 
-    /// Whole candidates, as many as that and one at least: spread evenly over azimuths and places.
-    pub(super) fn evenly(&self, count: f64) -> Vec<Meridian> {
+    /// Whole candidates, as many as that and one at least: spread evenly over azimuths and places, with
+    /// windows of one length.
+    pub(super) fn evenly(&self, count: f64, window: Duration) -> Vec<Meridian> {
         let far = |i: &usize| (*i as f64) < count.max(1.0);
         let taken = self.candidates.iter().enumerate().take_while(|(i, _)| far(i));
-        taken.map(|(_, candidate)| *candidate).collect()
+        taken.map(|(_, candidate)| Meridian { window, ..*candidate }).collect()
     }
 
     /// Time to come to a candidate from the nearest of the places where the axes will have stood.
@@ -150,27 +189,29 @@ impl Between {
         stands.iter().map(time).fold(f64::INFINITY, f64::min)
     }
 
-    /// The part of a candidate's way, in signed nodes, with the most gain for its time; the gain, and
-    /// the time.
+    /// The part of a candidate's way with the most gain for its time, at one pace.
     fn best_part(
         &self,
         terms: &Terms,
         candidate: usize,
+        worths: &[Worth],
+        pace: &SweepPace,
         way_s: f64,
-    ) -> Option<(usize, usize, f64, f64)> {
-        let gains: Vec<f64> = (0..self.signed()).map(|at| self.gain(candidate, at)).collect();
+    ) -> Option<Part> {
+        let slower = pace.slower_than(terms.pace());
         let mut sums = vec![0.0];
-        for gain in &gains {
-            sums.push(sums[sums.len() - 1] + gain);
+        for worth in worths {
+            sums.push(sums[sums.len() - 1] + worth.gain(slower));
         }
-        let parts = (0..gains.len())
-            .flat_map(|from| (from + NODES_MIN..=gains.len()).map(move |to| (from, to)));
-        let rated = parts.map(|(from, to)| {
+        let ends = (0..worths.len())
+            .flat_map(|from| (from + NODES_MIN..=worths.len()).map(move |to| (from, to)));
+        let parts = ends.map(|(from, to)| {
             let span = (to - from) as f64 * self.nodes.step_rad;
-            let time_s = terms.pace.around_s + way_s + span * terms.pace.seconds_per_rad;
-            (from, to, sums[to] - sums[from], time_s)
+            let time_s = way_s + pace.sweep_s(span);
+            let gain = sums[to] - sums[from];
+            Part { candidate, from, to, pace: *pace, gain, time_s }
         });
-        rated.max_by(|a, b| (a.2 / a.3).total_cmp(&(b.2 / b.3)))
+        parts.max_by(|a, b| a.rate().total_cmp(&b.rate()))
     }
 
     /// Nodes along the arm's whole way.
@@ -190,16 +231,25 @@ impl Between {
         }
     }
 
-    fn gain(&self, candidate: usize, at: usize) -> f64 {
-        let (node, ray) = self.node(candidate, at);
-        self.nodes.weights[node] * self.unknown[node].reduction(ray, self.noise[node])
+    /// What reading along a candidate's whole way is worth, node by node.
+    fn worths(&self, candidate: usize) -> Vec<Worth> {
+        let worth = |at: usize| {
+            let (node, ray) = self.node(candidate, at);
+            let unknown = &self.unknown[node];
+            Worth {
+                without_noise: self.nodes.weights[node] * unknown.reduction(ray, 0.0),
+                variance: unknown.variance(ray),
+                noise: self.noise[node],
+            }
+        };
+        (0..self.signed()).map(worth).collect()
     }
 
-    fn learn(&mut self, candidate: usize, from: usize, to: usize) {
-        for at in from..to {
-            let (node, ray) = self.node(candidate, at);
-            let noise = self.noise[node];
-            self.unknown[node].learn(ray, noise);
+    fn learn(&mut self, terms: &Terms, part: &Part) {
+        let slower = part.pace.slower_than(terms.pace());
+        for at in part.from..part.to {
+            let (node, ray) = self.node(part.candidate, at);
+            self.unknown[node].learn(ray, self.noise[node] / slower);
         }
     }
 
@@ -219,10 +269,10 @@ fn counts(terms: &Terms, meridian: &Meridian) -> Latched {
 
 /// How many times as large as expected errors are around each place, by the values left out.
 fn scales(field: &Kriging, places: &[Place]) -> Vec<f64> {
+    // Where noise is most of an error, chance must not pass for structure.
     let ratio = |(knot, left_out): (&fit::kriging::Knot, &fit::kriging::LeftOut)| {
-        let expected = (left_out.variance - knot.variance).max(1e-3 * left_out.variance);
-        let seen = (left_out.error * left_out.error - knot.variance).max(0.0);
-        (knot.at, seen / expected)
+        let seen = (left_out.error * left_out.error).max(knot.variance);
+        (knot.at, seen / left_out.variance)
     };
     let ratios: Vec<(Place, f64)> = field.knots().iter().zip(field.left_out()).map(ratio).collect();
     let mean = ratios.iter().map(|(_, ratio)| ratio).sum::<f64>() / ratios.len() as f64;

@@ -10,6 +10,7 @@ mod gaps;
 mod scans;
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use fit::{Optics, Region};
 use serde::{Deserialize, Serialize};
@@ -55,7 +56,8 @@ pub struct Terms {
     pub region: Region,
     /// What the detector sees.
     pub optics: Option<Optics>,
-    pace: SweepPace,
+    /// The plan's own first; never empty.
+    paces: Vec<SweepPace>,
 }
 
 /// What was found after a round.
@@ -116,9 +118,14 @@ impl Terms {
         optics: Option<Optics>,
     ) -> Result<Option<Self>, Problem> {
         let Some(adaptive) = plan.adaptive().copied() else { return Ok(None) };
-        let pace = plan.sweep_pace(rig)?;
+        let paces = plan.sweep_paces(rig)?;
         let (plan, rig) = (plan.clone(), rig.clone());
-        Ok(Some(Self { plan, adaptive, rig, region, optics, pace }))
+        Ok(Some(Self { plan, adaptive, rig, region, optics, paces }))
+    }
+
+    /// The plan's own.
+    fn pace(&self) -> &SweepPace {
+        &self.paces[0]
     }
 
     fn check(&self, j: u32) -> Meridian {
@@ -137,7 +144,7 @@ impl Terms {
     }
 
     /// The next checks that have not been flown.
-    fn further_checks(&self, steps: &[Step], count: usize) -> Vec<Meridian> {
+    fn further_checks(&self, steps: &[Step], count: usize, window: Duration) -> Vec<Meridian> {
         let had: BTreeSet<[i32; 3]> = steps
             .iter()
             .map(|step| {
@@ -146,7 +153,8 @@ impl Terms {
             })
             .collect();
         let is_new = |check: &Meridian| !self.stands(check).iter().any(|at| had.contains(at));
-        (0..CHECKS_MAX).map(|j| self.check(j)).filter(is_new).take(count).collect()
+        let new = (0..CHECKS_MAX).map(|j| self.check(j)).filter(is_new).take(count);
+        new.map(|check| Meridian { window, ..check }).collect()
     }
 
     /// Where all checks are.
@@ -333,9 +341,12 @@ impl State<'_> {
         let asked = self.terms.adaptive.radiance_relative?;
         let (checked, between) = (account.checked_relative?, account.between_relative?);
         let last = self.before.last().and_then(|account| account.checked_relative)?;
-        let is_stuck = checked > asked
+        // What the checks' own noise may have added to it does not speak against the functions.
+        let upper = account.checked_upper_relative.unwrap_or(checked);
+        let least = libm::sqrt((2.0 * checked * checked - upper * upper).max(0.0));
+        let is_stuck = least > asked
             && between <= asked
-            && checked > STUCK * between
+            && least > STUCK * between
             && checked > STUCK_GAIN * last;
         if !is_stuck {
             return None;
@@ -359,6 +370,24 @@ impl State<'_> {
         (value > 0.0).then(|| (largest.name.clone(), libm::sqrt(square) / value))
     }
 
+    /// The pace of sweeps that are not chosen for their place: the plan's where a value's noise is below
+    /// the target, one as much slower as brings it there otherwise, if a sweep may take that long.
+    fn pace(&self, span_rad: f64, most_s: f64) -> SweepPace {
+        let terms = self.terms;
+        let plans = *terms.pace();
+        let Some(asked) = terms.adaptive.radiance_relative else { return plans };
+        let wanted = (self.between.noise_relative() / asked).powi(2);
+        let is_slower = |pace: &&SweepPace| pace.slower_than(&plans) > 1.0;
+        let slower = terms.paces.iter().filter(is_slower);
+        let mut best = plans;
+        for pace in slower.take_while(|pace| pace.sweep_s(span_rad) <= most_s) {
+            if best.slower_than(&plans) < wanted {
+                best = *pace;
+            }
+        }
+        best
+    }
+
     /// The next round, or why there is none.
     fn next(&mut self, steps: &[Step]) -> Result<Vec<Meridian>, String> {
         let terms = self.terms;
@@ -370,8 +399,10 @@ impl State<'_> {
         let most = terms.plan.stop.rig_time_max.map_or(f64::INFINITY, |most| most.as_secs_f64());
         let left_s = most - Prediction::homing_s_of(&terms.rig) - so_far_s;
         let span_rad = 2.0 * terms.plan.region.theta_max_rad;
-        let sweep_s = terms.pace.around_s + span_rad * terms.pace.seconds_per_rad;
+        let sweep_s = terms.pace().sweep_s(span_rad);
         let wanted_s = (GROWTH * so_far_s).max(SWEEPS_LEAST * sweep_s).min(left_s);
+        let pace = self.pace(span_rad, wanted_s / SWEEPS_LEAST);
+        let (window, sweep_s) = (pace.window, pace.sweep_s(span_rad));
         // Of a round's time a part goes to checks, which are whole sweeps.
         let part = 1.0 / (SWEEPS_PER_CHECK as f64 + 1.0);
         let chosen_s = wanted_s * (1.0 - part);
@@ -379,11 +410,12 @@ impl State<'_> {
         // whole ones, evenly.
         let asked = terms.adaptive.radiance_relative.unwrap_or(0.0);
         let mut chosen = if self.between.relative() <= asked {
-            self.between.evenly(chosen_s / sweep_s)
+            self.between.evenly(chosen_s / sweep_s, window)
         } else {
             self.between.choose(terms, after.here, chosen_s)
         };
-        let mut checks = terms.further_checks(steps, (chosen.len() / SWEEPS_PER_CHECK).max(1));
+        let count = (chosen.len() / SWEEPS_PER_CHECK).max(1);
+        let mut checks = terms.further_checks(steps, count, window);
         while !(chosen.is_empty() && checks.is_empty()) {
             let wanted: Vec<Meridian> = chosen.iter().chain(&checks).copied().collect();
             match terms.plan.lay_out_round(&terms.rig, after, &wanted) {

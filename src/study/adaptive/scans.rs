@@ -1,9 +1,12 @@
 //! Sweeps as they were measured: what each read at fixed angles θ, whatever windows it had.
 
+use std::time::Duration;
+
 use fit::kriging::{Knot, Place};
 
 use super::Terms;
 use crate::plan::Step;
+use crate::rig::Latched;
 use crate::rig::calibration::{Calibrated, Flag, Sample};
 
 /// Fewer readings than these say nothing of a curve.
@@ -31,6 +34,8 @@ pub(super) struct Scan {
     pub(super) x_m: f64,
     pub(super) y_m: f64,
     pub(super) is_check: bool,
+    /// How many times slower than at the plan's pace.
+    pub(super) slower: f64,
     /// By rising angle.
     pub(super) points: Vec<Point>,
 }
@@ -68,12 +73,12 @@ pub(super) fn scans(terms: &Terms, steps: &[Step], calibrated: &Calibrated) -> V
         let at = steps.binary_search_by_key(&sample.reading, |step| step.id).ok()?;
         let step = steps[at];
         let [_, phi, x, y] = step.counts.0;
-        step.swept.map(|_| [phi, x, y])
+        step.swept.map(|swept| ([phi, x, y], seconds_per_rad(terms, step.dwell, swept.travel)))
     };
     for (place, sample) in calibrated.samples.iter().enumerate() {
         let is_bad =
             sample.flags.contains(Flag::Saturated) || sample.flags.contains(Flag::Unsettled);
-        let Some(counts) = sweep_of(sample).filter(|_| !is_bad) else { continue };
+        let Some((counts, pace)) = sweep_of(sample).filter(|_| !is_bad) else { continue };
         let [arm_rad, phi_rad, x_m, y_m] = sample.positions.0;
         let variance = sample.u_independent * sample.u_independent;
         let point = Point { arm_rad, value: sample.value, variance, sample: place };
@@ -81,7 +86,8 @@ pub(super) fn scans(terms: &Terms, steps: &[Step], calibrated: &Calibrated) -> V
             scan.points.push(point);
         } else {
             let is_check = checks.contains(&counts);
-            scans.push((counts, Scan { phi_rad, x_m, y_m, is_check, points: vec![point] }));
+            let (slower, points) = (pace / terms.pace().seconds_per_rad, vec![point]);
+            scans.push((counts, Scan { phi_rad, x_m, y_m, is_check, slower, points }));
         }
     }
     let mut scans: Vec<Scan> = scans.into_iter().map(|(_, scan)| scan).collect();
@@ -90,6 +96,13 @@ pub(super) fn scans(terms: &Terms, steps: &[Step], calibrated: &Calibrated) -> V
         scan.points.sort_by(|a, b| a.arm_rad.total_cmp(&b.arm_rad));
     }
     scans
+}
+
+/// Of windows that go so far.
+fn seconds_per_rad(terms: &Terms, window: Duration, travel: Latched) -> f64 {
+    let adc = terms.rig.detector.adc;
+    let window_s = f64::from(adc.readings_in(window)) / f64::from(adc.rate_hz);
+    window_s / terms.rig.axes[0].position(f64::from(travel.0[0])).abs()
 }
 
 impl Scan {
@@ -130,16 +143,21 @@ pub(super) fn place(terms: &Terms, arm_rad: f64, phi_rad: f64, x_m: f64, y_m: f6
     ]
 }
 
-/// What the sweeps read at a node, on either side of the zenith, and the sweeps that did.
-pub(super) fn knots(terms: &Terms, scans: &[Scan], nodes: &Nodes, node: usize) -> Vec<Knot> {
+/// What the sweeps read at a node, on either side of the zenith; and the noise's variance of such a
+/// value, had all of them the plan's pace.
+pub(super) fn knots(terms: &Terms, scans: &[Scan], nodes: &Nodes, node: usize) -> (Vec<Knot>, f64) {
     let theta = nodes.thetas_rad[node];
-    let both = |scan: &Scan| {
-        [theta, -theta].map(|arm| {
-            let (value, variance) = scan.at(arm, 0.5 * nodes.step_rad)?;
-            Some(Knot { at: scan.place(terms, arm), value, variance })
-        })
-    };
-    scans.iter().flat_map(both).flatten().collect()
+    let mut noise = 0.0;
+    let mut knots = Vec::new();
+    for scan in scans {
+        for arm in [theta, -theta] {
+            let Some((value, variance)) = scan.at(arm, 0.5 * nodes.step_rad) else { continue };
+            noise += scan.slower * variance;
+            knots.push(Knot { at: scan.place(terms, arm), value, variance });
+        }
+    }
+    let count = knots.len().max(1) as f64;
+    (knots, noise / count)
 }
 
 /// Least squares of a + b t + c t² at t = 0, and the variance of a. Exact for three points.
@@ -178,8 +196,14 @@ mod tests {
             sample: 0,
         };
         let points = [-0.3, -0.15, 0.02, 0.1, 0.31].map(point);
-        let scan =
-            Scan { phi_rad: 0.0, x_m: 0.0, y_m: 0.0, is_check: false, points: points.to_vec() };
+        let scan = Scan {
+            phi_rad: 0.0,
+            x_m: 0.0,
+            y_m: 0.0,
+            is_check: false,
+            slower: 1.0,
+            points: points.to_vec(),
+        };
         let (value, variance) = scan.at(0.05, 1.0).unwrap();
         assert!((value - (2.0 - 0.05 + 3.0 * 0.0025)).abs() < 1e-12, "{value}");
         // Five readings, three unknowns: less than one reading's, more than a fifth of it.
