@@ -96,7 +96,8 @@ fn a_report_is_whole_self_contained_and_drawn_again_to_the_same_bytes() {
     check_self_contained(&document);
     assert!(page.contains("Simulated: these readings were computed"), "nobody may overlook it");
     let targets = format!("{0} of {0} measured", run["targets_planned"]);
-    for part in ["small", "simulated gantry", "seed 1", targets.as_str()] {
+    let unseen = "Not looked for: features narrower than ";
+    for part in ["small", "simulated gantry", "seed 1", targets.as_str(), unseen] {
         assert!(page.contains(part), "{part}");
     }
     check_results(&bench, &document);

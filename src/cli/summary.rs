@@ -206,7 +206,8 @@ pub(crate) fn model_rows(
     let basis = format!("{}, {count} coefficients, {held}", basis_in_words(fit.basis()));
     let mut rows = vec![row("basis", basis)];
     rows.extend(choice.map(|choice| row("  chosen by", choice_in_words(choice))));
-    rows.extend(resolves.map(|resolves| row("resolves", resolves_in_words(resolves))));
+    rows.extend(resolves.as_ref().map(|resolves| row("resolves", resolves_in_words(resolves))));
+    rows.extend(resolves.as_ref().map(|resolves| row("not looked for", unseen_in_words(resolves))));
     rows.extend(fit.aliased().map(|cause| row("note", cause.to_string())));
     rows
 }
@@ -252,7 +253,21 @@ fn choice_in_words(choice: &Choice) -> String {
     format!("{text}; next {basis} ({:+.2} a reading)", next.score)
 }
 
-fn resolves_in_words(resolves: Resolves) -> String {
+/// What may have been missed: the report says so too.
+pub(crate) fn unseen_in_words(resolves: &Resolves) -> String {
+    let round = resolves.phi_rad.map_or(0.0, |phi| phi.width * resolves.measured_to_rad.sin());
+    let width = resolves.theta_rad.width.max(round).to_degrees();
+    if width.is_finite() {
+        format!(
+            "features narrower than {width:.1}° of arc: they may lie between the readings, or be \
+             smeared out"
+        )
+    } else {
+        "features of any width".to_owned()
+    }
+}
+
+fn resolves_in_words(resolves: &Resolves) -> String {
     let degrees = |width: Width| {
         if width.width.is_finite() {
             format!("{:.1}° ({})", width.width.to_degrees(), width.limit.name())

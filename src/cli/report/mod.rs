@@ -21,6 +21,7 @@ use super::folder::JOURNAL;
 use super::output::{say, say_json, write_out};
 use super::results::{Results, read_run};
 use super::setup::Setup;
+use super::summary::unseen_in_words;
 use super::text::{row, table};
 use crate::export::write_atomically;
 use crate::journal::{Header, Reader, Session};
@@ -92,6 +93,7 @@ pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Re
         Ok(fitted) => {
             sections.push(Section {
                 title: "Results".to_owned(),
+                paragraphs: vec![format!("Not looked for: {}.", unseen_in_words(&fitted.resolves))],
                 table: quantities::table(setup, results, fitted),
                 items: facts::notes(setup, results),
                 ..Section::default()

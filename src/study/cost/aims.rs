@@ -104,24 +104,36 @@ fn known(reached: &[Reached], target: Target, scenes: &[Scene], least: f64) -> A
     Aim { text, found: said(parts.into_iter()), is_met }
 }
 
+/// How wide the spike is.
+const SPIKE_DEG: f64 = 1.6;
 /// A left-out sweep is told apart from noise when its readings are off by this many of their u.
 const TOLD: f64 = 2.0;
 
-/// Runs whose radiance is off by more than 5 % of a lobe that is narrower than declared.
+/// Runs whose radiance is off by more than 5 % of a lobe that is narrower than declared. They tell of it
+/// where sweeps left out are missed, where a run that decides does not believe that it is done, or
+/// where the report claims to show no feature as narrow as that.
 fn spike(runs: &[Run]) -> Aim {
     let missed: Vec<&Run> = runs
         .iter()
         .filter(|run| run.scene == Scene::Spike && Strategy::AIMED.contains(&run.strategy))
         .filter(|run| run.radiance > 0.05)
         .collect();
-    let is_told = |run: &&&Run| run.left_out_rms.is_some_and(|rms| rms > TOLD);
-    let told = missed.iter().filter(is_told).count();
-    let lowest = missed.iter().filter_map(|run| run.left_out_rms).fold(f64::INFINITY, f64::min);
+    let is_off = |run: &Run| run.left_out_rms.is_some_and(|rms| rms > TOLD);
+    let is_open = |run: &Run| run.believes == Some(false);
+    let is_stated = |run: &Run| run.resolves_deg.is_some_and(|deg| deg > SPIKE_DEG);
+    let count = |is: &dyn Fn(&Run) -> bool| missed.iter().filter(|run| is(run)).count();
+    let told = count(&|run| is_off(run) || is_open(run) || is_stated(run));
+    let narrowest = missed.iter().filter_map(|run| run.resolves_deg).fold(f64::INFINITY, f64::min);
     let found = match missed.len() {
         0 => "no run missed it".to_owned(),
-        count => format!(
-            "{told} of {count} runs that miss it (error above 5 %) are told by sweeps left \
-             out; the quietest of them is off by {lowest:.1} u"
+        all => format!(
+            "of {all} runs that miss it (error above 5 %) {} are told by sweeps left out (off by \
+             more than {TOLD} u), {} do not believe that they are done, and {} report what they \
+             have not looked for (features narrower than {narrowest:.1}° at least); {} say nothing",
+            count(&is_off),
+            count(&is_open),
+            count(&is_stated),
+            all - told
         ),
     };
     let was_run =
@@ -208,6 +220,14 @@ mod tests {
         let met: Vec<Option<bool>> = found.iter().map(|aim| aim.is_met).collect();
         let yes = Some(true);
         assert_eq!(met, [yes, yes, yes, yes, Some(false), None, yes], "{found:?}");
+        for told in [
+            Run { believes: Some(false), ..spike.clone() },
+            Run { resolves_deg: Some(6.0), ..spike.clone() },
+        ] {
+            assert_eq!(aims(&reached, &[told])[4].is_met, yes);
+        }
+        let silent = Run { resolves_deg: Some(1.5), believes: Some(true), ..spike.clone() };
+        assert_eq!(aims(&reached, &[silent])[4].is_met, Some(false));
         spike.left_out_rms = Some(8.0);
         spike.bound_s = 9.0;
         let found = aims(&reached, &[spike]);

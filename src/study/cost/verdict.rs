@@ -40,6 +40,11 @@ pub struct Run {
     pub factor: f64,
     /// Of a fit: RMS error of the prediction of readings of sweeps left out, over their stated u.
     pub left_out_rms: Option<f64>,
+    /// Of a fit: the narrowest feature that its report claims to show, degrees of arc; what is narrower
+    /// was not looked for.
+    pub resolves_deg: Option<f64>,
+    /// Of a run that decides: whether it ended believing that its target is met.
+    pub believes: Option<bool>,
     /// Of a fit: its basis and how many coefficients that has.
     pub basis: Option<(String, usize)>,
     /// Processor's wall time, seconds: the simulation is in it where no other strategy had it made.
@@ -210,6 +215,8 @@ pub(super) mod tests {
             exitance: -0.5 * radiance,
             factor: 1.0,
             left_out_rms: None,
+            resolves_deg: None,
+            believes: None,
             basis: None,
             compute_s: 0.0,
         }

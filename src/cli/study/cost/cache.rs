@@ -70,6 +70,8 @@ impl<'a> Cache<'a> {
             exitance: number("exitance")?,
             factor: number("factor")?,
             left_out_rms: number("left_out_rms"),
+            resolves_deg: number("resolves_deg"),
+            believes: kept["believes"].as_bool(),
             basis: basis.zip(coefficients),
             compute_s: number("compute_s")?,
         })
@@ -90,6 +92,8 @@ impl<'a> Cache<'a> {
             "exitance": run.exitance,
             "factor": run.factor,
             "left_out_rms": run.left_out_rms,
+            "resolves_deg": run.resolves_deg,
+            "believes": run.believes,
             "basis": basis,
             "coefficients": coefficients,
             "compute_s": run.compute_s,
@@ -159,6 +163,8 @@ mod tests {
             exitance: -0.001,
             factor: 1.002,
             left_out_rms: Some(1.1),
+            resolves_deg: Some(5.9),
+            believes: Some(true),
             basis: Some(("zernike 28 x 1".to_owned(), 28)),
             compute_s: 0.5,
         };

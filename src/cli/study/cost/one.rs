@@ -47,6 +47,7 @@ struct Made {
     values: Vec<f64>,
     exitance: f64,
     left_out_rms: Option<f64>,
+    resolves_deg: Option<f64>,
     basis: Option<(String, usize)>,
 }
 
@@ -179,6 +180,7 @@ impl<'a> Bench<'a> {
             values: vec![0.0; truth.radiance.len()],
             exitance: 0.0,
             left_out_rms: None,
+            resolves_deg: None,
             basis: Some((why, 0)),
         };
         let made = made.unwrap_or_else(nothing);
@@ -198,6 +200,12 @@ impl<'a> Bench<'a> {
             exitance: score.factor * made.exitance / truth.exitance - 1.0,
             factor: score.factor,
             left_out_rms: made.left_out_rms,
+            resolves_deg: made.resolves_deg,
+            believes: one
+                .setup
+                .accounts
+                .last()
+                .and_then(|last| Some(last.verdict.as_ref()?.is_met)),
             basis: made.basis,
             compute_s: one.compute_s + began.elapsed().as_secs_f64(),
         })
@@ -242,8 +250,17 @@ fn fitted(one: &Acquisition, nodes: &Nodes) -> Result<Made, String> {
         values: nodes.rays().map(|(ray, _)| found.fit.value(&ray)).collect(),
         exitance: found.fit.exitance_within_region().value,
         left_out_rms: best.map(|best| best.left_out_rms),
+        resolves_deg: Some(arc_deg(&found.resolves)),
         basis: Some((name, basis.len())),
     })
+}
+
+/// The narrowest feature that it claims to show, whichever way it lies: by arc at the edge of what was
+/// measured.
+fn arc_deg(resolves: &fit::Resolves) -> f64 {
+    let round = resolves.phi_rad.map_or(0.0, |phi| phi.width * resolves.measured_to_rad.sin());
+    // Of what it has no idea it claims nothing.
+    resolves.theta_rad.width.max(round).to_degrees().min(180.0)
 }
 
 /// Splines through the readings, each taken as the radiance at its target.
@@ -255,5 +272,5 @@ fn interpolated(one: &Acquisition, nodes: &Nodes) -> Result<Made, String> {
         samples.filter_map(|s| Some((*poses.get(&s.index)?, s.value))).collect();
     let values = interpolate(&readings, nodes).map_err(|error| error.to_string())?;
     let exitance = nodes.exitance(&values);
-    Ok(Made { values, exitance, left_out_rms: None, basis: None })
+    Ok(Made { values, exitance, left_out_rms: None, resolves_deg: None, basis: None })
 }
