@@ -38,7 +38,7 @@ const SWEEPS_PER_CHECK: usize = 4;
 const CHECKS_MAX: u32 = 400;
 /// The fit is asked once the interpolation's own error is no more than this many times the target.
 const FIT_FROM: f64 = 1.5;
-/// A fit that stays this far above what lies between the sweeps can't follow them ...
+/// A fit that stays this far above what lies between the sweeps, twice, can't follow them ...
 const STUCK: f64 = 2.0;
 /// ... if a round did not bring its error down to this part.
 const STUCK_GAIN: f64 = 0.9;
@@ -340,13 +340,15 @@ impl State<'_> {
         }
         let asked = self.terms.adaptive.radiance_relative?;
         let (checked, between) = (account.checked_relative?, account.between_relative?);
-        let last = self.before.last().and_then(|account| account.checked_relative)?;
+        let before = self.before.last()?;
+        let (last, last_between) = (before.checked_relative?, before.between_relative?);
         // What the checks' own noise may have added to it does not speak against the functions.
         let upper = account.checked_upper_relative.unwrap_or(checked);
         let least = libm::sqrt((2.0 * checked * checked - upper * upper).max(0.0));
         let is_stuck = least > asked
             && between <= asked
             && least > STUCK * between
+            && last > STUCK * last_between
             && checked > STUCK_GAIN * last;
         if !is_stuck {
             return None;
