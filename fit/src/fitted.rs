@@ -157,6 +157,24 @@ impl Fit {
         Self { parts, influence: None, ..self.clone() }
     }
 
+    /// The same fit without the scale that all samples share: of the shifts by the components named, the
+    /// part that is a factor of the whole field is left out, the factor being that of the exitance. What
+    /// such a component does to the field's shape stays: the blur of a wider footprint, say.
+    #[must_use]
+    pub fn without_scale(&self, components: &[&str]) -> Self {
+        let whole = dot(self.basis.exitance(), &self.parts.coefficients);
+        let mut parts = self.parts.clone();
+        let is_named = |shift: &&mut CommonShift| components.contains(&shift.name.as_str());
+        for CommonShift { shift, .. } in parts.shifts.iter_mut().filter(is_named) {
+            let factor = dot(self.basis.exitance(), shift) / whole;
+            if factor.is_finite() {
+                let own = shift.iter_mut().zip(&self.parts.coefficients);
+                own.for_each(|(shift, coefficient)| *shift -= factor * coefficient);
+            }
+        }
+        self.with_parts(parts)
+    }
+
     /// What the fit made of each sample; `None` of a fit that was stored and taken up again, or merged
     /// from shares.
     pub fn weighed(&self) -> Option<&Weighed> {

@@ -332,6 +332,16 @@ fn a_spot_that_is_wider_than_stated_shifts_the_fit_as_its_component_says() {
     let top = ray(0.0, 0.001, 20.0, 40.0);
     let part = plain.radiance_contributions(&top)[1].u / (u * plain.value(&top));
     assert!(part < 0.97, "{part}");
+    // Without the scale that is common to all, the blur stays, and no less than what is independent.
+    let shape = plain.without_scale(&["throughput @ spot"]);
+    assert!(shape.exitance().u < 1e-9 + 1.0001 * plain.exitance().u_independent);
+    for x_m in [0.0, 0.002, 0.004, 0.006] {
+        let at = ray(x_m, 0.001, 20.0, 40.0);
+        let (with, without) = (plain.radiance(&at), shape.radiance(&at));
+        assert!(without.u >= without.u_independent && without.u < with.u, "{x_m}: {without:?}");
+        assert!((without.u_independent / with.u_independent - 1.0).abs() < 1e-12);
+    }
+    assert!(shape.radiance(&top).u > 2.0 * shape.radiance(&top).u_independent);
 }
 
 #[test]

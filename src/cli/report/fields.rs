@@ -2,7 +2,7 @@
 
 use fit::{Contribution, Fit, Ray};
 
-use super::quantities::{scale_u_relative, without_scale};
+use super::quantities::without_scale;
 use super::words::Words;
 use crate::cli::results::Results;
 use crate::cli::setup::Setup;
@@ -19,8 +19,8 @@ pub(super) fn section(setup: &Setup, results: &Results, fitted: &Fitted) -> Sect
     let words = Words::of(setup.rig.detector.quantity);
     let used: Vec<&Sample> =
         results.calibrated.samples.iter().filter(|s| !s.flags.excludes_from_fit()).collect();
-    let scale = scale_u_relative(&results.calibrated);
-    let mut pictures = vec![polar(fit, &words, &used), hemisphere(fit, &words, &used, scale)];
+    let shape = without_scale(fit, &results.calibrated);
+    let mut pictures = vec![polar(fit, &words, &used), hemisphere([fit, &shape], &words, &used)];
     pictures.extend(plane(fit, &words, &used));
     Section { title: format!("The field: {}", words.radiance), pictures, ..Section::default() }
 }
@@ -53,7 +53,8 @@ fn polar(fit: &Fit, words: &Words, used: &[&Sample]) -> Picture {
     .picture()
 }
 
-fn hemisphere(fit: &Fit, words: &Words, used: &[&Sample], scale: f64) -> Picture {
+/// Of a fit, with and without the common scale.
+fn hemisphere([fit, shape]: [&Fit; 2], words: &Words, used: &[&Sample]) -> Picture {
     let (x_m, y_m) = centre(fit);
     let ray = |theta_rad: f64, phi_rad: f64| Ray { x_m, y_m, theta_rad, phi_rad };
     let directions: Vec<(f64, f64)> =
@@ -66,10 +67,7 @@ fn hemisphere(fit: &Fit, words: &Words, used: &[&Sample], scale: f64) -> Picture
         quantity: &words.radiance_symbol(),
         unit: words.radiance_unit,
         value: &|theta, phi| fit.value(&ray(theta, phi)),
-        u: &|theta, phi| {
-            let estimate = fit.radiance(&ray(theta, phi));
-            [estimate.u, without_scale(&estimate, scale)]
-        },
+        u: &|theta, phi| [fit, shape].map(|fit| fit.radiance(&ray(theta, phi)).u),
         u_side,
         directions: &directions,
         place: &at_centre(fit),

@@ -25,17 +25,18 @@ struct Row {
 
 /// The table of a fit's results.
 pub(super) fn table(setup: &Setup, results: &Results, fitted: &Fitted) -> Table {
-    let scale = scale_u_relative(&results.calibrated);
     let has_truth = results.truth.is_some();
     let mut columns =
         vec!["", "value ± u (k = 1)", "u", "u without the common scale", "measured fraction"];
     if has_truth {
         columns.extend(["truth", "error", "error / u"]);
     }
-    let rows = rows(setup, results, &fitted.fit);
+    let shape = without_scale(&fitted.fit, &results.calibrated);
+    let rest = rows(setup, results, &shape).into_iter().map(|row| row.estimate.u);
+    let rows = rows(setup, results, &fitted.fit).into_iter().zip(rest);
     Table {
         columns: columns.into_iter().map(str::to_owned).collect(),
-        rows: rows.iter().map(|row| row.cells(scale, has_truth)).collect(),
+        rows: rows.map(|(row, rest)| row.cells(rest, has_truth)).collect(),
     }
 }
 
@@ -83,11 +84,11 @@ fn place(ray: &fit::Ray) -> String {
 }
 
 impl Row {
-    fn cells(&self, scale: f64, has_truth: bool) -> Vec<String> {
+    /// `rest` is u without the common scale.
+    fn cells(&self, rest: f64, has_truth: bool) -> Vec<String> {
         let Estimate { value, u, .. } = self.estimate;
         let relative =
             |u: f64| if value == 0.0 { "–".to_owned() } else { percent(u / value.abs()) };
-        let rest = without_scale(&self.estimate, scale);
         let none = || "–".to_owned();
         let mut cells = vec![
             self.name.clone(),
@@ -121,24 +122,19 @@ impl Row {
     }
 }
 
-/// The standard uncertainty without that of the common scale, which shifts every quantity that is
-/// linear in the readings by the same part of itself.
-pub(super) fn without_scale(estimate: &Estimate, scale_u_relative: f64) -> f64 {
-    let Estimate { value, u, .. } = *estimate;
-    libm::sqrt((u * u - (scale_u_relative * value).powi(2)).max(0.0))
-}
-
-/// The relative standard uncertainty of what scales all readings alike: the detector's
-/// responsivity and throughput, and the gain where only one range was used.
-pub(super) fn scale_u_relative(calibrated: &Calibrated) -> f64 {
+/// The fit without what scales all readings alike: the detector's responsivity and throughput, and the
+/// gain where only one range was used.
+pub(super) fn without_scale(fit: &Fit, calibrated: &Calibrated) -> Fit {
     let samples = &calibrated.samples;
     let is_everywhere = |gain: u8| samples.iter().all(|sample| sample.gain == gain);
-    let squares = calibrated.components.iter().map(|component| match component.effect {
-        Effect::Scale { gain } if gain.is_none_or(is_everywhere) => component.u * component.u,
-        Effect::Beam { .. } => component.u * component.u,
-        _ => 0.0,
-    });
-    libm::sqrt(squares.sum())
+    let is_scale = |effect: Effect| match effect {
+        Effect::Scale { gain } => gain.is_none_or(is_everywhere),
+        Effect::Beam { .. } => true,
+        _ => false,
+    };
+    let scales = calibrated.components.iter().filter(|component| is_scale(component.effect));
+    let names: Vec<&str> = scales.map(|component| component.name.as_str()).collect();
+    fit.without_scale(&names)
 }
 
 /// The true intensity of the region along the normal: the radiance over the region, by a product
