@@ -11,7 +11,7 @@
 
 use crate::basis::Basis;
 use crate::parts::CommonShift;
-use crate::{Chart, Fit, FitError, Parts, Quality, Ray, Region, Truncation, sparse};
+use crate::{Angular, Chart, Fit, FitError, Parts, Quality, Ray, Region, Truncation, sparse};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
 
@@ -267,7 +267,7 @@ fn packed(m: &Mat<f64>) -> Vec<f64> {
 /// The combinations of coefficients that a symmetry changes: orthonormal columns.
 fn forbidden(basis: &Basis, symmetry: Symmetry) -> Result<Mat<f64>, SymmetryError> {
     let p = basis.len();
-    let rays = rays(basis.region(), 2 * p + 60);
+    let rays = rays(basis, 2 * p + 60);
     let rows = |image: &dyn Fn(&Ray) -> Ray| {
         let mut scratch = basis.scratch();
         let mut row = vec![0.0; p];
@@ -306,12 +306,17 @@ fn forbidden(basis: &Basis, symmetry: Symmetry) -> Result<Mat<f64>, SymmetryErro
     Ok(svd.V().get(.., ..rank).to_owned())
 }
 
-/// Rays spread evenly (Roberts' sequence) over the directions and a disk within the region.
-fn rays(region: &Region, count: usize) -> Vec<Ray> {
+/// Rays spread evenly (Roberts' sequence) over the directions and a disk within the region. Harmonics
+/// of the whole sphere are told apart on the whole of it alone.
+fn rays(basis: &Basis, count: usize) -> Vec<Ray> {
+    let region = basis.region();
     let middle = |(from, to): (f64, f64)| 0.5 * (from + to);
     let half = |(from, to): (f64, f64)| 0.5 * (to - from);
     let radius = half(region.x_m).min(half(region.y_m));
-    let theta_max = region.theta_max_rad.max(core::f64::consts::FRAC_PI_2);
+    let theta_max = match basis.spec().angular {
+        Angular::Spherical { .. } => core::f64::consts::PI,
+        _ => region.theta_max_rad.max(core::f64::consts::FRAC_PI_2),
+    };
     // The powers of the inverse of x⁵ = x + 1's root.
     let part = |i: usize, power: i32| {
         let step = libm::pow(1.167_303_978_261_418_7, -f64::from(power));

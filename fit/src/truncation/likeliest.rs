@@ -15,15 +15,11 @@ pub(super) struct Hold {
     /// How much smaller a function is that varies around the normal or with the place: most sources
     /// are nearly the same all round.
     pub(super) around: f64,
-    /// Whether cos θ is held as the first degree beyond the fit's own is, of which it differs from
-    /// what polynomials make of it; else as of its own degree, as fields need that are steep at the
-    /// horizon.
-    pub(super) is_flat: bool,
 }
 
 impl Default for Hold {
     fn default() -> Self {
-        Self { power: POWER, around: 1.0, is_flat: false }
+        Self { power: POWER, around: 1.0 }
     }
 }
 

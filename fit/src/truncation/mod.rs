@@ -1,9 +1,11 @@
 //! What a fit's functions can't follow, in the u of everything that follows from the fit.
 //!
 //! Beside the reported fit stands a wider model of the same readings: the fit's functions, as free as
-//! they are in the fit, and finer ones beyond them, held by a prior in which a function of degree n
-//! has the variance (1 + n)^(-2 power)/λ. Power and λ are those under which the readings are likeliest
-//! (restricted maximum likelihood, as for [`crate::choose`]). Given the readings, the field is then
+//! they are in the fit, and harmonics on the sphere beyond them, held by a prior in which one of degree
+//! n has the variance (1 + n)^(-2 power)/λ: a field that varies as much everywhere. Power and λ are those
+//! under which the readings are likeliest (restricted maximum likelihood, as for [`crate::choose`]). The
+//! same prior then holds the fit's own polynomials too where the fit itself holds nothing against them:
+//! free, they would run away where nothing was measured. Given the readings, the field is then
 //! normal about the wider model's mean with its covariance Σ, and the reported fit lies off that mean
 //! by a known field. A linear functional f of the reported fit has the mean square error
 //!
@@ -49,8 +51,7 @@ impl Fit {
     /// [`fit_flown`](crate::fit_flown) made the fit of. A fit that nothing finer makes likelier is
     /// left without [`Parts::truncation`](crate::Parts::truncation); one that was stored and taken up again stays as it is, as
     /// does one in a chart other than the surface one, and one so fine that what is finer has more
-    /// than 320 functions wherever in position it is the same: hemispherical harmonics from degree
-    /// 20 on, Zernike polynomials from degree 87 on.
+    /// than 480 functions even where it is the same in all places: from degree 119 on.
     /// Costs one or two passes of a design that is two to five times as wide as the fit's.
     pub fn with_truncation(
         self,
@@ -62,7 +63,9 @@ impl Fit {
         let (Some(influence), Some(weighed)) = (self.influence(), self.weighed()) else {
             return Ok(self);
         };
-        let Some(spec) = finer(&self, samples) else { return Ok(self) };
+        let Some(Finer { spec, kept, polynomials }) = Finer::of(&self, samples) else {
+            return Ok(self);
+        };
         if influence.variances.len() != samples.len() {
             return Ok(self);
         }
@@ -77,7 +80,8 @@ impl Fit {
             values: &influence.values,
             weighed,
             beyond: design,
-            kept: kept(self.basis(), spec),
+            kept,
+            polynomials,
         };
         let (joint, found) = wider.likeliest(influence)?;
         wider.widen(&self, &joint, &found)
@@ -122,56 +126,72 @@ impl Shared {
     }
 }
 
-/// Functions that follow what a fit's own can't: finer ones of the direction, and where places tell
-/// more of the position. Where they would be too many, finer ones of the direction matter more: as
-/// fine in position as leaves room for two degrees more in direction. `None` where even the same
-/// everywhere they are too many, see [`Fit::with_truncation`].
-fn finer(fit: &Fit, samples: &[Sample]) -> Option<BasisSpec> {
-    let own = fit.basis();
-    let degree = match own.angular {
-        Angular::Zernike { degree, .. } | Angular::EvenHarmonics { degree } => degree,
-        Angular::Hemispherical { degree } => degree + 2,
-        Angular::Spherical { degree } if !fit.region().chart.is_whole_sphere() => degree + 2,
-        Angular::Splines { .. } => OF_SPLINES,
-        Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
-    };
-    let grid = Grid::of(samples, fit.region());
-    let distinct = grid.x_m.len().max(grid.y_m.len());
-    let position = own.position.degree().unwrap_or(0);
-    let most = position.max((position + 1).min(distinct.saturating_sub(1)));
-    let spec = |degree, position| BasisSpec {
-        angular: Angular::Zernike { degree, cosine_columns: COSINE_COLUMNS },
-        position: Position::Legendre { degree: position },
-    };
-    let degrees = (degree + 2..=degree + DEGREES).rev();
-    let specs = (0..=most).rev().flat_map(|at| degrees.clone().map(move |degree| spec(degree, at)));
-    let is_affordable =
-        |spec: &BasisSpec| spec.checked_len().is_ok() && kept(own, *spec).len() <= FUNCTIONS_MAX;
-    specs.into_iter().find(is_affordable)
+/// What follows what a fit's own functions can't.
+struct Finer {
+    /// Harmonics on the sphere: under their prior a field that varies as much everywhere.
+    spec: BasisSpec,
+    /// Those that the fit doesn't have itself.
+    kept: Vec<usize>,
+    /// Those that are the same fields as the fit's polynomials on the disk; none of other functions.
+    polynomials: Vec<usize>,
 }
 
-/// Those of the finer functions that the fit doesn't have itself.
-fn kept(own: BasisSpec, beyond: BasisSpec) -> Vec<usize> {
-    let width = beyond.angular.len();
-    let all = 0..beyond.len();
-    // Even harmonics are the same polynomials on the disk.
-    let (degree, cosine_columns) = match own.angular {
-        Angular::Zernike { degree, cosine_columns } => (degree, cosine_columns),
-        Angular::EvenHarmonics { degree } => (degree, 0),
-        _ => return all.collect(),
-    };
-    let Position::Legendre { .. } = own.position else { return all.collect() };
-    let polynomials = width - COSINE_COLUMNS;
-    let is_own = |k: &usize| {
-        let (q, j) = (k / width, k % width);
-        let is_direction = if j < polynomials {
-            j < (degree + 1) * (degree + 2) / 2
-        } else {
-            j - polynomials < cosine_columns
+impl Finer {
+    /// Of a degree beyond the fit's own, and where places tell more of the position. Where they would be
+    /// too many, finer ones of the direction matter more: as fine in position as leaves room for two
+    /// degrees more in direction. Where even the same everywhere they are too many, those of the fit's
+    /// own degrees are left out; `None` where they still are, see [`Fit::with_truncation`].
+    fn of(fit: &Fit, samples: &[Sample]) -> Option<Self> {
+        let own = fit.basis();
+        let degree = match own.angular {
+            Angular::Zernike { degree, .. }
+            | Angular::EvenHarmonics { degree }
+            | Angular::Hemispherical { degree } => degree,
+            Angular::Spherical { degree } if !fit.region().chart.is_whole_sphere() => degree,
+            Angular::Splines { .. } => OF_SPLINES,
+            Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
         };
-        is_direction && q < own.position.len()
-    };
-    all.filter(|k| !is_own(k)).collect()
+        let grid = Grid::of(samples, fit.region());
+        let distinct = grid.x_m.len().max(grid.y_m.len());
+        let position = own.position.degree().unwrap_or(0);
+        let most = position.max((position + 1).min(distinct.saturating_sub(1)));
+        let all = (0..=most).rev().map(|position| (position, 0)).chain([(0, degree + 1)]);
+        let tried = all.flat_map(|(position, least)| {
+            let degrees = (degree + 2..=degree + DEGREES).rev();
+            degrees.map(move |degree| (degree, position, least))
+        });
+        tried
+            .map(|(degree, position, least)| {
+                let angular = Angular::Spherical { degree };
+                (BasisSpec { angular, position: Position::Legendre { degree: position } }, least)
+            })
+            .filter(|(spec, _)| spec.checked_len().is_ok())
+            .map(|(spec, least)| Self::within(own, spec, least))
+            .find(|finer| finer.kept.len() <= FUNCTIONS_MAX)
+    }
+
+    /// Of harmonics that the fit doesn't have those from a degree on.
+    fn within(own: BasisSpec, spec: BasisSpec, least: usize) -> Self {
+        let width = spec.angular.len();
+        let degree = |k: usize| (k % width).isqrt();
+        // l + m is even where a harmonic is a polynomial on the disk.
+        let is_even = |k: usize| (k % width - degree(k) * degree(k)).is_multiple_of(2);
+        let is_own = |k: &usize| {
+            let is_direction = match own.angular {
+                Angular::Zernike { degree: own, .. } | Angular::EvenHarmonics { degree: own } => {
+                    is_even(*k) && degree(*k) <= own
+                }
+                Angular::Spherical { degree: own } => degree(*k) <= own,
+                _ => false,
+            };
+            let is_polynomial = matches!(own.position, Position::Legendre { .. });
+            is_direction && is_polynomial && k / width < own.position.len()
+        };
+        let (held, others): (Vec<usize>, Vec<usize>) = (0..spec.len()).partition(is_own);
+        let kept = others.into_iter().filter(|k| degree(*k) >= least).collect();
+        let is_harmonic = matches!(own.angular, Angular::Spherical { .. });
+        Self { spec, kept, polynomials: if is_harmonic { Vec::new() } else { held } }
+    }
 }
 
 /// Degrees beyond the fit's own at most.
@@ -179,6 +199,4 @@ const DEGREES: usize = 8;
 /// Of the finer functions beside splines.
 const OF_SPLINES: usize = 12;
 /// Finer functions at most that the fit doesn't have itself.
-const FUNCTIONS_MAX: usize = 320;
-/// Against slow convergence at the horizon.
-const COSINE_COLUMNS: usize = 2;
+const FUNCTIONS_MAX: usize = 480;

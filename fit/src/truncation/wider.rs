@@ -2,8 +2,8 @@
 //! under noise as it is stated or as the fit took it; and what the likeliest says of the fit.
 
 use super::likeliest::{Hold, Likeliest, POWER, Shares};
-use super::{COSINE_COLUMNS, Shared, Truncation};
-use crate::basis::dot;
+use super::{Shared, Truncation};
+use crate::basis::{Basis, dot};
 use crate::beam::design::Design;
 use crate::parts::Parts;
 use crate::penalty::{Prior, Roughness};
@@ -11,6 +11,7 @@ use crate::triangle::{Solution, Triangle};
 use crate::weights::has_unknown;
 use crate::{Fit, FitError, Influence, Weighed};
 use faer::Mat;
+use glam::DVec3;
 use std::ops::RangeInclusive;
 
 /// The fit's functions and finer ones.
@@ -25,6 +26,8 @@ pub(super) struct Wider<'s> {
     pub(super) beyond: Design<'s>,
     /// The finer functions that aren't the fit's own.
     pub(super) kept: Vec<usize>,
+    /// Harmonics among `beyond` that the fit's own polynomials are sums of.
+    pub(super) polynomials: Vec<usize>,
 }
 
 /// All readings under some variances: a triangle of the fit's functions, what samples share, the
@@ -145,53 +148,59 @@ impl Wider<'_> {
         let below = joint.solution.rotated(0).split_off(self.known());
         let alone = Likeliest::alone(rest + dot(&below, &below), free, &scales);
         let tried = |hold: Hold| {
-            let shares = Shares::of(&joint.solution, self.known(), &self.root(hold)?)?;
+            let shares = Shares::of(&joint.solution, self.known(), &self.root(hold, &self.kept)?)?;
             let found = shares.likeliest(rest, free, &scales);
             Ok::<_, FitError>(found.map(|found| Likeliest { hold, ..found }))
         };
         let mut best = Likeliest { ..alone };
         for around in AROUND {
-            best = best.or(tried(Hold { power: POWER, around, is_flat: false })?);
+            best = best.or(tried(Hold { power: POWER, around })?);
         }
         for power in OTHER_POWERS {
             best = best.or(tried(Hold { power, ..best.hold })?);
         }
-        best = best.or(tried(Hold { is_flat: true, ..best.hold })?);
         let gain = alone.deviance - best.deviance;
         let mut found = if gain > GAIN_MIN { Likeliest { gain, ..best } } else { alone };
         found.deviance += self.determinants(joint);
         Ok(found)
     }
 
-    /// The square root of what is held against the finer functions.
-    fn root(&self, hold: Hold) -> Result<Mat<f64>, FitError> {
+    /// The square root of what is held against some of the harmonics.
+    fn root(&self, hold: Hold, harmonics: &[usize]) -> Result<Mat<f64>, FitError> {
         let basis = self.beyond.basis();
-        let mut root = Roughness::new(basis, hold.power)?.of_functions(&self.kept);
-        // A column of cos θ is new by what no polynomial of the fit's own degree follows of it.
-        let directions = basis.directions();
-        let degrees = self.kept.iter().map(|k| directions.degree(k % basis.angular_len()));
-        let polynomials = basis.angular_len() - COSINE_COLUMNS;
-        let is_cosine = |k: usize| k % basis.angular_len() >= polynomials;
-        let first = degrees
-            .clone()
-            .zip(&self.kept)
-            .filter(|(_, k)| !is_cosine(**k) && **k < polynomials)
-            .map(|(d, _)| d)
-            .min()
-            .unwrap_or(0);
-        for (j, (degree, k)) in degrees.zip(&self.kept).enumerate() {
-            if hold.is_flat && is_cosine(*k) && degree < first {
-                let more = libm::pow((1.0 + first as f64) / (1.0 + degree as f64), hold.power);
-                root.col_as_slice_mut(j).iter_mut().for_each(|value| *value *= more);
-            }
-        }
-        for (j, k) in self.kept.iter().enumerate() {
+        let mut root = Roughness::new(basis, hold.power)?.of_functions(harmonics);
+        for (j, k) in harmonics.iter().enumerate() {
             let (q, j_direction) = (k / basis.angular_len(), k % basis.angular_len());
             if q > 0 || basis.directions().order(j_direction) != 0 {
                 root.col_as_slice_mut(j).iter_mut().for_each(|value| *value *= hold.around);
             }
         }
         Ok(root)
+    }
+
+    /// What the likeliest prior holds against the fit's own functions where the fit itself holds
+    /// nothing against them: they are harmonics too, and left free they would run away where nothing
+    /// was measured, the finer ones with them.
+    fn absorb_own(&self, triangle: &mut Triangle, found: &Likeliest) -> Result<(), FitError> {
+        let (basis, own, harmonics) = (self.beyond.basis(), self.own.basis(), &self.polynomials);
+        let polynomials = harmonics.iter().filter(|k| **k < basis.angular_len()).count();
+        if polynomials == 0 || !self.prior.is_none() {
+            return Ok(());
+        }
+        let root = self.root(found.hold, harmonics)?;
+        let turn = as_harmonics(own, polynomials, basis, &harmonics[..polynomials])?;
+        let mut row = vec![0.0; self.known() + self.kept.len() + 1];
+        for i in 0..harmonics.len() {
+            let place = i / polynomials;
+            let first = place * own.angular_len();
+            let strength = found.strength.sqrt() * root[(i, i)];
+            for (j, value) in row[first..first + polynomials].iter_mut().enumerate() {
+                *value = strength * turn[j][i % polynomials];
+            }
+            triangle.absorb(&row);
+            row[first..first + polynomials].fill(0.0);
+        }
+        Ok(())
     }
 
     /// The fit with the likeliest model's u.
@@ -210,13 +219,16 @@ impl Wider<'_> {
         self.absorb_known(&mut triangle);
         // Without finer functions any hold on them leaves the fit's own columns alone.
         let strength = if is_wider { found.strength } else { 1.0 };
-        let root = self.root(found.hold)?;
+        let root = self.root(found.hold, &self.kept)?;
         let mut row = vec![0.0; known + q + 1];
         for i in 0..q {
             for j in 0..q {
                 row[known + j] = strength.sqrt() * root[(i, j)];
             }
             triangle.absorb(&row);
+        }
+        if is_wider {
+            self.absorb_own(&mut triangle, found)?;
         }
         let solution = triangle.solve().ok_or(FitError::OutOfRange)?;
         let factor = solution.inverse();
@@ -292,6 +304,39 @@ impl Wider<'_> {
     }
 }
 
+/// The first functions of direction of a fit, each as a sum of harmonics that span the same fields: by
+/// least squares over directions all over the hemisphere, exact to rounding.
+fn as_harmonics(
+    own: &Basis,
+    polynomials: usize,
+    basis: &Basis,
+    harmonics: &[usize],
+) -> Result<Vec<Vec<f64>>, FitError> {
+    let mut triangle = Triangle::new(polynomials, polynomials);
+    let (mut own_room, mut room) = (own.scratch(), basis.scratch());
+    let mut values = vec![0.0; own.angular_len()];
+    let mut all = vec![0.0; basis.angular_len()];
+    let mut row = vec![0.0; 2 * polynomials];
+    let count = DIRECTIONS_EACH * polynomials;
+    for i in 0..count {
+        // As many a solid angle everywhere, the next a golden angle further round.
+        let cos = (i as f64 + 0.5) / count as f64;
+        let (sin, phi) = ((1.0 - cos * cos).sqrt(), GOLDEN_ANGLE_RAD * i as f64);
+        let d = DVec3::new(sin * libm::cos(phi), sin * libm::sin(phi), cos);
+        own.direction_along(d, &mut own_room, &mut values);
+        basis.direction_along(d, &mut room, &mut all);
+        row[..polynomials].iter_mut().zip(harmonics).for_each(|(out, k)| *out = all[*k]);
+        row[polynomials..].copy_from_slice(&values[..polynomials]);
+        triangle.absorb(&row);
+    }
+    let solution = triangle.solve().ok_or(FitError::OutOfRange)?;
+    Ok((0..polynomials).map(|j| solution.unknowns(j)).collect())
+}
+
+/// Directions that tell harmonics apart, for each of them.
+const DIRECTIONS_EACH: usize = 4;
+/// π (3 - √5).
+const GOLDEN_ANGLE_RAD: f64 = 2.399_963_229_728_653;
 /// Other powers that are tried.
 const OTHER_POWERS: [f64; 1] = [2.0];
 /// See [`Hold::around`].
