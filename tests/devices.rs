@@ -8,6 +8,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use bench::Bench;
+use bench::twins::{self, Devices};
 
 const DEVICES: &str = "\
 [[axes_link]]
@@ -168,4 +169,28 @@ fn what_a_rig_file_gets_wrong_about_its_devices_is_named() {
     bare.gonio(&["run", "plan.toml"]).refused(&["[[axes_link]]"]);
     let encoders = on_devices().with("rig.toml", "readback = \"steps\"", "readback = \"encoder\"");
     encoders.gonio(&["run", "plan.toml"]).refused(&["grbl", "no encoder", "steps"]);
+}
+
+#[test]
+fn a_meter_in_another_unit_and_garbage_are_refused_when_they_are_reached() {
+    let newport = "driver = \"newport-1830c\"\nranges = [4, 3, 2, 1]\n";
+    let keithley = "driver = \"keithley-6485\"\nbaud = 57600\n";
+    let drivers = ["grbl", "newport-1830c"];
+    let bench = twins::at_ports(on_devices().with("rig.toml", keithley, newport), &drivers);
+    let _sim = Devices::switched_on(&bench, &drivers);
+    std::fs::write(bench.path("newport-1830c"), "U2\n").unwrap();
+    let run = ["run", "plan.toml", "--out", "run"];
+    let before = bench.names();
+    bench.gonio(&run).refused(&["newport 1830-c", "unit 2 (dBm", "unit 1, W"]);
+    std::fs::write(bench.path("newport-1830c"), "U1\n").unwrap();
+    // What a wrong baud rate looks like, at the board's port and at the meter's.
+    let rig = bench.text("rig.toml");
+    for driver in drivers {
+        let garbage = bench::device::chatterer();
+        let port = bench.path(driver).display().to_string();
+        let spoilt = rig.replace(&port, &garbage);
+        std::fs::write(bench.path("rig.toml"), spoilt).unwrap();
+        bench.gonio(&run).refused(&[&driver[..4], "baud"]);
+    }
+    assert_eq!(bench.names(), before);
 }

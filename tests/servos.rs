@@ -109,3 +109,32 @@ fn what_is_wrong_with_servos_or_meter_is_found_before_anything_moves() {
         assert_eq!(bench.names(), before);
     }
 }
+
+#[test]
+fn a_servo_in_another_mode_or_turn_is_refused_when_it_is_reached() {
+    use std::io::Write as _;
+
+    let bench = twins::at_ports(small(), &DRIVERS);
+    let sim = Devices::switched_on(&bench, &DRIVERS);
+    // As the maker's tool would: register 11 of servo 1 is set to 1, velocity.
+    let write: [u8; 13] =
+        [0xff, 0xff, 0xfd, 0x00, 0x01, 0x06, 0x00, 0x03, 0x0b, 0x00, 0x01, 0x47, 0x63];
+    let mut port = std::fs::OpenOptions::new().write(true).open(bench.path("dynamixel")).unwrap();
+    port.write_all(&write).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    drop(port);
+    let before = bench.names();
+    let run = ["run", "plan.toml", "--out", "run"];
+    bench.gonio(&run).refused(&["servo 1 (theta): operating mode 1", "register 11"]);
+    assert_eq!(bench.names(), before);
+    drop(sim);
+
+    // Without their zeros x and y would leave the servos' turn.
+    let start = "dark_current_a = 1e-12\nstart_fraction_of_travel = { x = 0.1, y = 0.9 }\n";
+    let bench = small().with("rig.toml", "zero_mm = { x = 50, y = 50 }\n", "").with(
+        "rig.toml",
+        "dark_current_a = 1e-12\n",
+        start,
+    );
+    bench.gonio(&run).refused(&["servo 3 (x)", "steps", "zero_mm"]);
+}

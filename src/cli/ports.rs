@@ -12,7 +12,7 @@ use super::failure::{Failure, Outcome};
 use super::output::{note, say, say_json};
 use super::session::draw_session;
 use super::text::table;
-use crate::device::{self, Found, Greeting, SerialSettings, list_ports, open_serial};
+use crate::device::{self, Found, Greeting, SerialSettings, ServoFound, list_ports, open_serial};
 
 /// A board that was reset by opening its port listens after two or three seconds.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -56,6 +56,10 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
             Found::Controller(identity) => as_json(identity),
             Found::Grbl(greeting) => grbl_as_json(greeting),
             Found::Instrument(name) => json!({ "kind": "instrument", "identity": name }),
+            Found::Newport { unit, range } => {
+                json!({ "kind": "newport-1830c", "unit": unit, "range": range })
+            }
+            Found::Servos(servos) => servos_as_json(servos),
         };
         document["port"] = json!(port);
         document["baud"] = json!(baud);
@@ -65,6 +69,10 @@ fn probe(port: &str, baud: u32, is_json: bool) -> Outcome {
             Found::Controller(identity) => as_text(identity),
             Found::Grbl(greeting) => grbl_as_text(greeting),
             Found::Instrument(name) => format!("  an instrument that calls itself {name}\n"),
+            Found::Newport { unit, range } => format!(
+                "  a Newport 1830-C, as it answers to U? and R?: unit {unit}, range {range}\n"
+            ),
+            Found::Servos(servos) => servos_as_text(servos),
         })?;
     }
     Ok(ExitCode::SUCCESS)
@@ -89,6 +97,24 @@ fn as_json(identity: &Identity) -> serde_json::Value {
         "adc_bits": identity.adc_bits, "adc_rate_hz": identity.adc_rate_hz,
         "queue_depth": identity.queue_depth, "lease_ms": identity.lease_ms,
     })
+}
+
+fn servos_as_json(servos: &[ServoFound]) -> serde_json::Value {
+    let list: Vec<_> = servos
+        .iter()
+        .map(|servo| {
+            json!({
+                "id": servo.id.number(), "model": servo.model, "name": servo.model_name(),
+                "firmware": servo.firmware, "hardware_error": servo.alert,
+            })
+        })
+        .collect();
+    json!({ "kind": "dynamixel", "servos": list })
+}
+
+fn servos_as_text(servos: &[ServoFound]) -> String {
+    let lines: Vec<String> = servos.iter().map(|servo| format!("  {servo}\n")).collect();
+    format!("  a bus of Dynamixel servos, protocol 2.0\n{}", lines.concat())
 }
 
 fn grbl_as_json(greeting: &Greeting) -> serde_json::Value {

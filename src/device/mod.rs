@@ -28,7 +28,7 @@ pub use axes::{Axes, AxesCommand, AxesEvent, AxesFacts, AxisFacts, Located};
 pub use composed::Composer;
 pub use controller::{ConnectError, Controller, DeviceEvent, LinkLost};
 pub use driver::{Driver, NamedFault, Promises, Refusal, Trouble};
-pub use dynamixel::{Dynamixel, ServoAxis, ServoId, ShutterServo};
+pub use dynamixel::{Dynamixel, ServoAxis, ServoFound, ServoId, ShutterServo};
 pub use grbl::{Grbl, Greeting};
 pub use line_ports::port_opener;
 pub use link::{Link, Opener, Openers, Opening, opener};

@@ -9,6 +9,7 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
 
 use super::controller::{ConnectError, Controller};
+use super::dynamixel::{RollCall, ServoFound};
 use super::grbl::{Greeting, Listener};
 use super::link::Link;
 
@@ -28,6 +29,15 @@ pub enum Found {
     Grbl(Greeting),
     /// A thing that answers to `*IDN?`, with what it calls itself.
     Instrument(String),
+    /// A Newport 1830-C, which has no name: known by how it answers `U?` and `R?`.
+    Newport {
+        /// Its unit: 1 W, 2 dBm, 3 dB, 4 relative.
+        unit: u8,
+        /// Its range, 1 to 8; 0 where it looks for one by itself.
+        range: u8,
+    },
+    /// Dynamixel servos.
+    Servos(Vec<ServoFound>),
 }
 
 /// Asks who is there. `session` and `patience` are for a controller of gonio's own, as in
@@ -39,7 +49,7 @@ pub async fn probe(
     patience: Duration,
 ) -> Result<Found, ConnectError> {
     let mut listener = Listener::default();
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         // `?` is a question to grbl, and no whole command to anybody else.
         say(&mut link, b"?").await?;
         if hear(&mut link, |byte| listener.take(byte)).await?.is_some() {
@@ -55,10 +65,51 @@ pub async fn probe(
         if let Some(name) = hear(&mut link, |byte| name(&mut line, byte)).await? {
             return Ok(Found::Instrument(name));
         }
+        // These boot with no port: once is enough.
+        if round == 0
+            && let Some(found) = without_a_name(&mut link).await?
+        {
+            return Ok(found);
+        }
     }
     let (controller, identity) = Controller::connect(link, session, baud, patience).await?;
     controller.close().await;
     Ok(Found::Controller(identity))
+}
+
+/// Those who answer neither `?` nor `*IDN?`.
+async fn without_a_name(link: &mut Link) -> Result<Option<Found>, ConnectError> {
+    say(link, b"U?\n").await?;
+    let mut line = Vec::new();
+    if let Some(unit @ 1..=4) = hear(link, |byte| digit(&mut line, byte)).await? {
+        say(link, b"R?\n").await?;
+        if let Some(range @ 0..=8) = hear(link, |byte| digit(&mut line, byte)).await? {
+            return Ok(Some(Found::Newport { unit, range }));
+        }
+    }
+    let mut call = RollCall::default();
+    say(link, &RollCall::question()).await?;
+    hear(link, |byte| {
+        call.take(&[byte]);
+        None::<()>
+    })
+    .await?;
+    let servos = call.found();
+    Ok((!servos.is_empty()).then_some(Found::Servos(servos)))
+}
+
+/// A line that is one digit.
+fn digit(line: &mut Vec<u8>, byte: u8) -> Option<u8> {
+    if byte != b'\n' && byte != b'\r' {
+        line.push(byte);
+        line.truncate(LINE_MAX);
+        return None;
+    }
+    let line = std::mem::take(line);
+    match line.trim_ascii() {
+        [digit @ b'0'..=b'9'] => Some(digit - b'0'),
+        _ => None,
+    }
 }
 
 /// What a thing calls itself: four words with commas between them (IEEE 488.2, 10.14).
@@ -150,6 +201,19 @@ mod tests {
         });
         let name = "KEITHLEY INSTRUMENTS INC.,MODEL 6485,1234567,B02".to_owned();
         assert_eq!(meter.await.unwrap(), Found::Instrument(name));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_newport_is_known_by_its_answers_and_is_told_nothing() {
+        let newport = found(|asked| match asked {
+            "U?\n" => "1\n",
+            "R?\n" => "0\n",
+            other => {
+                assert!(!other.contains(char::is_numeric), "{other}");
+                ""
+            }
+        });
+        assert_eq!(newport.await.unwrap(), Found::Newport { unit: 1, range: 0 });
     }
 
     #[tokio::test(start_paused = true)]

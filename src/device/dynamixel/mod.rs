@@ -12,6 +12,7 @@
 mod bus;
 mod motion;
 mod packet;
+mod roll_call;
 mod servo;
 mod survey;
 mod table;
@@ -29,6 +30,8 @@ use super::driver::{Driver, NamedFault, Promises, Trouble};
 use bus::{Bus, Heard};
 use motion::Work;
 pub use packet::ServoId;
+pub(super) use roll_call::RollCall;
+pub use roll_call::ServoFound;
 use servo::{Servo, Ticks};
 pub use servo::{ServoAxis, ShutterServo};
 use survey::Survey;

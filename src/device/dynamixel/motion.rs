@@ -112,7 +112,7 @@ impl Dynamixel {
     pub(super) fn begin_stop(&mut self, now: Instant) {
         let stage = match &self.doing {
             Doing::Work(Work { stage: Stage::Moving(_), .. }) => {
-                self.brake();
+                self.brake(&[]);
                 Stage::Braking(now + BRAKING_MAX, false)
             }
             _ => Stage::Looking,
@@ -124,15 +124,17 @@ impl Dynamixel {
         }
     }
 
-    /// Tells every servo that may move to come to rest as its profile says.
-    fn brake(&mut self) {
+    /// Tells every servo that may move to come to rest as its profile says; but for those of which
+    /// it is not known where they are: by an old position they would be sent back.
+    fn brake(&mut self, unseen: &[ServoId]) {
         let moved = match &self.doing {
             Doing::Work(Work { command: Command::MoveTo(goals, _), .. }) => goals.clone(),
             _ => Vec::new(),
         };
         let goal = |(n, servo): (usize, &Servo)| {
             let is_sent = moved.get(n).is_some_and(Option::is_some);
-            (is_sent || !servo.stands()).then(|| servo.braked())
+            let is_seen = !unseen.contains(&servo.id());
+            (is_seen && (is_sent || !servo.stands())).then(|| servo.braked())
         };
         let goals: Goals = self.servos.iter().enumerate().map(goal).collect();
         self.tell_goals(&goals);
@@ -180,12 +182,13 @@ impl Dynamixel {
             Stage::Waking(looks) => return self.woken(now, command, looks, heard),
             _ => {}
         }
+        let missing = heard.missing.clone();
         if let Err(silence) = self.take_states(heard) {
             let is_stop = command == Command::Stop;
-            // Whoever still hears it comes to rest; the others' watchdog stops them.
+            // Whoever answers comes to rest; the others' watchdog stops them.
             if is_stop || matches!(stage, Stage::Moving(_)) {
                 self.doing = Doing::Work(Work { command, stage });
-                self.brake();
+                self.brake(&missing);
             }
             return self.end(if is_stop {
                 AxesEvent::Stopped(None)
@@ -206,7 +209,7 @@ impl Dynamixel {
             return self.restart(now);
         }
         if command == Command::Stop {
-            self.brake();
+            self.brake(&[]);
             self.doing =
                 Doing::Work(Work { command, stage: Stage::Braking(now + BRAKING_MAX, false) });
             self.wake = Some(now + LOOK_AGAIN);
@@ -288,11 +291,7 @@ impl Dynamixel {
     /// The servos' encoders are absolute: a home is where they say that they are, if that can be.
     fn adopt(&mut self, now: Instant) {
         let mut servos = self.axes().iter().enumerate();
-        let outside = servos.find(|(_, servo)| {
-            let (low, high) = servo.axis.travel;
-            let slack = self.tolerance.cast_signed();
-            !(low.saturating_sub(slack)..=high.saturating_add(slack)).contains(&servo.position())
-        });
+        let outside = servos.find(|(_, servo)| servo.is_outside(self.tolerance));
         if let Some((n, servo)) = outside {
             let (low, high) = servo.axis.travel;
             let what = format!(
@@ -381,7 +380,7 @@ impl Dynamixel {
     /// The move is over: those that still go come to rest.
     fn give_up(&mut self, command: Command, moving: Moving, trouble: Trouble) {
         self.doing = Doing::Work(Work { command, stage: Stage::Moving(moving) });
-        self.brake();
+        self.brake(&[]);
         self.end(AxesEvent::Trouble(trouble));
     }
 

@@ -59,6 +59,8 @@ impl fmt::Display for ServoId {
 pub(super) enum Instruction {
     /// Who are you? Model and firmware.
     Ping(ServoId),
+    /// The same to all, who answer one after the other.
+    PingAll,
     /// So many bytes from an address on.
     Read {
         /// Whom.
@@ -121,7 +123,7 @@ impl Instruction {
     pub(super) fn encode(&self) -> Result<Vec<u8>, TooLong> {
         let mut content = vec![self.code()];
         match self {
-            Self::Ping(_) | Self::Reboot(_) => {}
+            Self::Ping(_) | Self::PingAll | Self::Reboot(_) => {}
             Self::Read { address, length, .. } => push_words(&mut content, [*address, *length]),
             Self::Write { address, data, .. } => {
                 push_words(&mut content, [*address]);
@@ -148,13 +150,16 @@ impl Instruction {
             Self::Ping(id) | Self::Reboot(id) | Self::Read { id, .. } | Self::Write { id, .. } => {
                 id.0
             }
-            Self::SyncRead { .. } | Self::FastSyncRead { .. } | Self::SyncWrite { .. } => BROADCAST,
+            Self::PingAll
+            | Self::SyncRead { .. }
+            | Self::FastSyncRead { .. }
+            | Self::SyncWrite { .. } => BROADCAST,
         }
     }
 
     const fn code(&self) -> u8 {
         match self {
-            Self::Ping(_) => 0x01,
+            Self::Ping(_) | Self::PingAll => 0x01,
             Self::Read { .. } => 0x02,
             Self::Write { .. } => 0x03,
             Self::Reboot(_) => 0x08,

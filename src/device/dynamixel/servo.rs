@@ -299,6 +299,12 @@ impl Servo {
         }
     }
 
+    /// Whether it stands beyond its axis's travel by more than this.
+    pub(super) fn is_outside(&self, tolerance: u32) -> bool {
+        let ((low, high), slack) = (self.axis.travel, tolerance.cast_signed());
+        !(low.saturating_sub(slack)..=high.saturating_add(slack)).contains(&self.position())
+    }
+
     /// Whether the position that it reports is that of its axis whatever happened before: within
     /// one turn its encoder is absolute; beyond, it counts turns from zero at each power-up.
     pub(super) fn is_absolute(&self) -> bool {

@@ -152,6 +152,18 @@ impl Dynamixel {
     }
 
     fn ready(&mut self) {
+        // A turn that is counted from power-up: what stands outside can't be homed.
+        let mut counted = self.axes().iter().filter(|servo| !servo.is_absolute());
+        if let Some(servo) = counted.find(|servo| servo.is_outside(self.tolerance)) {
+            let (low, high) = servo.axis.travel;
+            return self.refuse((
+                format!("{}: stands at {} steps of its own", servo.words(), servo.position()),
+                format!("{low} to {high}, its travel in the rig file"),
+                "correct zero_deg or zero_mm; or turn it back by hand with the power off, within \
+                 the right turn"
+                    .to_owned(),
+            ));
+        }
         let servos = self.servos.iter();
         let identities = servos.map(|servo| format!("{} {}", servo.words(), servo.model()));
         let facts = AxesFacts {

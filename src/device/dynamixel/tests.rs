@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use firmware_protocol::Shutter;
 use sim::{
-    Bench, DynamixelBus, Emitter, LinkFaults, Nominal, NominalAxis, NominalDetector, NominalGain,
-    Quantity, Scene, ServoFault, ServoSetting, Shape, Simulated, SimulatedBoard, Terms, Wire,
-    compile,
+    Bench, DeviceFault, DynamixelBus, Emitter, FaultKind, LinkFaults, Nominal, NominalAxis,
+    NominalDetector, NominalGain, Note, Quantity, Scene, ServoFault, ServoSetting, Shape,
+    Simulated, SimulatedBoard, Terms, Wire, compile,
 };
 
 use super::packet::Instruction;
@@ -252,6 +252,26 @@ fn servos_stop_by_themselves_when_the_host_falls_silent() {
     // A strike is left by the next move.
     assert_eq!(pair.command(AxesCommand::Clear), Some(AxesEvent::Cleared));
     assert_eq!(done(pair.move_to([goal, home[1]])), [goal, home[1]]);
+}
+
+#[test]
+fn servos_that_are_heard_no_more_are_left_to_their_watchdog() {
+    let mut pair = pair();
+    let home = done(pair.command(AxesCommand::Home));
+    let kind = FaultKind::Mute;
+    let delay = Duration::from_millis(300);
+    let fault = DeviceFault { device: String::new(), kind, nth: 1, delay, lasts: None };
+    pair.bench.plan_fault(0, fault);
+    let goal = if home[0] > 2048 { 100 } else { 4000 };
+    let event = pair.move_to([goal, home[1]]);
+    assert!(matches!(event, Some(AxesEvent::Trouble(Trouble::Silent(_)))), "{event:?}");
+    pair.now = pair.now + Duration::from_secs(3);
+    pair.bench.advance(pair.now);
+    let notes = pair.bench.take_notes();
+    let [Note::Began(began, ..), Note::AtRest(stood)] = notes[..] else { panic!("{notes:?}") };
+    let took = stood.since(began).as_secs_f64();
+    // The host asks in vain for a while; from its last word on 500 ms, and 430 ms of braking.
+    assert!((0.5..1.4).contains(&took), "{took}");
 }
 
 #[test]
