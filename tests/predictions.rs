@@ -85,6 +85,47 @@ fn the_plan_that_is_found_reaches_its_target_in_less_time() {
 }
 
 #[test]
+fn exitance_alone_is_had_from_the_nodes_of_a_quadrature_rule() {
+    // A grid keeps its nine places; the rule needs as many as the fit's degree in position.
+    let bench = expecting().with("plan.toml", "x_count = 2", "x_count = 3").with(
+        "plan.toml",
+        "y_count = 2",
+        "y_count = 3",
+    );
+    let words = ["plan", "plan.toml", "--target", "exitance=1%", "--json", "-o", "found.toml"];
+    let found = bench.gonio(&words).well().json();
+    let best = found["best"]["what"].as_str().unwrap();
+    assert!(best.starts_with("quadrature 2 x 6, degree 2"), "{found}");
+    let text = bench.text("found.toml");
+    assert!(text.contains("kind = \"quadrature\"") && !text.contains("theta_step_deg"), "{text}");
+    // It is a plan like others: it runs, and its exitance is right.
+    let run = bench.gonio(&["run", "found.toml", "--out", "run", "--json"]).well().json();
+    assert_eq!(run["targets_measured"], run["targets_planned"]);
+    let truth = number(&run, "/truth/exitance_w_per_m2");
+    assert!((number(&run, "/exitance_w_per_m2/value") / truth - 1.0).abs() < 0.014, "{run}");
+    // Radiance is not a sum.
+    let words = ["plan", "plan.toml", "--target", "radiance=1%", "--json"];
+    let found = bench.gonio(&words).well().json();
+    let considered = found["considered"].as_array().unwrap();
+    let is_rule = |row: &Value| row["what"].as_str().unwrap().contains("quadrature");
+    assert!(!considered.is_empty() && !considered.iter().any(is_rule), "{found}");
+}
+
+#[test]
+fn dark_readings_are_lengthened_where_the_dark_level_stands_in_the_way() {
+    let ends = "dwell_ms = 50\n\n[reference]";
+    let bench = noisy().with("plan.toml", ends, "dwell_ms = 2\n\n[reference]");
+    let words =
+        ["plan", "plan.toml", "--target", "exitance=1%", "--without-scale", "-o", "found.toml"];
+    let said = bench.gonio(&words).well();
+    assert!(said.out.contains("cheapest:") && said.out.contains(", dark "), "{said}");
+    let text = bench.text("found.toml");
+    let dark = text.split("[dark]").nth(1).unwrap().split('[').next().unwrap();
+    let dwell = dark.lines().find_map(|line| line.strip_prefix("dwell_ms = ")).unwrap();
+    assert!(dwell.trim().parse::<f64>().unwrap() > 2.0, "{text}");
+}
+
+#[test]
 fn what_no_plan_reaches_is_said_with_its_floor() {
     let bench = expecting();
     let words = ["plan", "plan.toml", "--target", "exitance=0.01%", "-o", "found.toml", "--json"];

@@ -34,6 +34,8 @@ const RELATIVE: Bounds = Bounds::positive_up_to(1.0);
 const WHOLE_SLACK: f64 = 1e-9;
 const NAME_BYTES_MAX: usize = 100;
 const COUNT_MAX: i64 = TARGETS_MAX as i64;
+/// Nodes of a quadrature rule along one coordinate: more are a grid.
+const NODES_MAX: i64 = 256;
 const REPEAT_MAX: i64 = 1_000;
 const ANGULAR_DEGREE_MAX: i64 = 60;
 const POSITION_DEGREE_MAX: i64 = 12;
@@ -188,6 +190,7 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// raster: `x_count`, `y_count`, `theta_step_deg`, `phi_step_deg` ·
 /// cgamma: `x_count`, `y_count`, `c_step_deg`, `gamma_step_deg` ·
 /// low-discrepancy: `count` · list: `file` ·
+/// quadrature: `x_count`, `y_count`, `theta_count`, `phi_count` ·
 /// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_feature_deg`, the full width at half
 /// maximum of the narrowest feature that is looked for (default: `[expect]`'s), or
 /// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`). Sweeps have their own order ·
@@ -203,6 +206,7 @@ fn read_schedule(
         CGamma,
         List,
         LowDiscrepancy,
+        Quadrature,
         Raster,
         Sweep,
     }
@@ -210,6 +214,7 @@ fn read_schedule(
         ("raster", Kind::Raster),
         ("cgamma", Kind::CGamma),
         ("low-discrepancy", Kind::LowDiscrepancy),
+        ("quadrature", Kind::Quadrature),
         ("list", Kind::List),
         ("sweep", Kind::Sweep),
         ("adaptive", Kind::Adaptive),
@@ -230,6 +235,12 @@ fn read_schedule(
             gamma_step_deg: step("gamma_step_deg")?,
         },
         Kind::LowDiscrepancy => Schedule::LowDiscrepancy { count: count("count")? },
+        Kind::Quadrature => Schedule::Quadrature {
+            x_count: read_count(&table, "x_count", NODES_MAX)?,
+            y_count: read_count(&table, "y_count", NODES_MAX)?,
+            theta_count: read_count(&table, "theta_count", NODES_MAX)?,
+            phi_count: count("phi_count")?,
+        },
         Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
         Kind::Sweep => read_sweep(&table, expect)?,
         Kind::Adaptive => Schedule::Adaptive(Adaptive::read(&table, expect)?),

@@ -4,6 +4,7 @@
 //! asked afterwards.
 
 use radiometry::direction::wrap_deg;
+use radiometry::quadrature::gauss_legendre;
 
 use super::{Region, Schedule};
 use crate::rig::Pose;
@@ -32,6 +33,28 @@ pub(super) fn poses(schedule: &Schedule, region: &Region) -> Vec<Pose> {
         // Sweeps have their poses from the rig's counts.
         Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => Vec::new(),
         Schedule::LowDiscrepancy { count } => (0..count).map(|i| evenly(i, region)).collect(),
+        Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
+            let xs = nodes(region.x_m, x_count);
+            let ys = nodes(region.y_m, y_count);
+            let places: Vec<(f64, f64)> =
+                xs.iter().flat_map(|x_m| ys.iter().map(|y_m| (*x_m, *y_m))).collect();
+            let sin2_max = libm::pow(libm::sin(region.theta_max_rad), 2.0);
+            let thetas: Vec<f64> = nodes((0.0, sin2_max), theta_count)
+                .into_iter()
+                .map(|sin2| libm::asin(libm::sqrt(sin2)))
+                .collect();
+            let phi = |i: u32| wrap_deg(360.0 * f64::from(i) / f64::from(phi_count)).to_radians();
+            // No node lies at the pole.
+            let meridians = |place: &(f64, f64)| {
+                let (x_m, y_m) = *place;
+                let thetas = &thetas;
+                let along = move |phi_rad: f64| {
+                    thetas.iter().map(move |&theta_rad| Pose { x_m, y_m, theta_rad, phi_rad })
+                };
+                (0..phi_count).map(phi).flat_map(along).collect::<Vec<Pose>>()
+            };
+            places.iter().flat_map(meridians).collect()
+        }
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             let places = places(region, x_count, y_count);
             let phis: Vec<f64> =
@@ -54,6 +77,10 @@ pub(super) fn count(schedule: &Schedule, region: &Region) -> u64 {
         }
         Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => 0,
         Schedule::LowDiscrepancy { count } => u64::from(count),
+        Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
+            let directions = u64::from(theta_count) * u64::from(phi_count);
+            directions.saturating_mul(u64::from(x_count) * u64::from(y_count))
+        }
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             grid(x_count, y_count, theta_step_deg, phi_step_deg)
         }
@@ -78,6 +105,16 @@ pub(super) fn places(region: &Region, x_count: u32, y_count: u32) -> Vec<(f64, f
     let ys = spread(region.y_m, y_count);
     let column = |x_m: f64| ys.iter().map(move |&y_m| (x_m, y_m));
     spread(region.x_m, x_count).into_iter().flat_map(column).collect()
+}
+
+/// Gauss-Legendre's nodes of an interval, rising.
+fn nodes((low, high): (f64, f64), count: u32) -> Vec<f64> {
+    let mut nodes: Vec<f64> = gauss_legendre(count as usize)
+        .into_iter()
+        .map(|(t, _)| low + (high - low) * 0.5 * (1.0 + t))
+        .collect();
+    nodes.sort_by(f64::total_cmp);
+    nodes
 }
 
 fn spread((low, high): (f64, f64), count: u32) -> Vec<f64> {
@@ -192,6 +229,30 @@ mod tests {
         assert_eq!(xs.first(), Some(&-0.01));
         assert_eq!(xs.last(), Some(&0.03));
         assert!(xs.iter().any(|x_m| (x_m - 0.01).abs() < 1e-15));
+    }
+
+    #[test]
+    fn quadrature_nodes_integrate_polynomials_of_the_disk() {
+        let region = region(80.0);
+        let schedule =
+            Schedule::Quadrature { x_count: 2, y_count: 1, theta_count: 3, phi_count: 8 };
+        let poses = poses(&schedule, &region);
+        assert_eq!(poses.len() as u64, count(&schedule, &region));
+        // The rule's weights in sin²θ, in the order of the nodes; its mean of a power is exact up to the
+        // fifth, and of waves round the circle up to the seventh.
+        let weights: Vec<f64> = {
+            let mut rule = gauss_legendre(3);
+            rule.sort_by(|a, b| a.0.total_cmp(&b.0));
+            rule.into_iter().map(|(_, weight)| 0.5 * weight / 16.0).collect()
+        };
+        let mean = |f: &dyn Fn(&Pose) -> f64| -> f64 {
+            poses.iter().enumerate().map(|(i, pose)| weights[i % 3] * f(pose)).sum()
+        };
+        let rim2 = libm::pow(libm::sin(80_f64.to_radians()), 2.0);
+        let u = |pose: &Pose| libm::pow(libm::sin(pose.theta_rad), 2.0) / rim2;
+        assert!((mean(&|pose| libm::pow(u(pose), 5.0)) - 1.0 / 6.0).abs() < 1e-12);
+        assert!(mean(&|pose| u(pose) * libm::cos(7.0 * pose.phi_rad + 0.3)).abs() < 1e-12);
+        assert!((mean(&|pose| pose.x_m) - 0.01).abs() < 1e-15);
     }
 
     #[test]

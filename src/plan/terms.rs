@@ -87,6 +87,18 @@ pub enum Schedule {
         /// How many.
         count: u32,
     },
+    /// The nodes of a product rule for the exitance: Gauss-Legendre's in x, y and sin²θ, evenly
+    /// spaced meridians.
+    Quadrature {
+        /// Columns of places on the sample.
+        x_count: u32,
+        /// Rows.
+        y_count: u32,
+        /// Circles of latitude.
+        theta_count: u32,
+        /// Meridians.
+        phi_count: u32,
+    },
     /// A grid in x, y, θ and φ.
     Raster {
         /// Columns of places on the sample.

@@ -93,6 +93,14 @@ impl Rung {
             Schedule::LowDiscrepancy { count } => {
                 Schedule::LowDiscrepancy { count: scaled_count(count, self.density) }
             }
+            Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
+                Schedule::Quadrature {
+                    x_count,
+                    y_count,
+                    theta_count: scaled_count(theta_count, finer),
+                    phi_count: scaled_count(phi_count, finer),
+                }
+            }
             Schedule::Sweep {
                 x_count,
                 y_count,
@@ -148,6 +156,10 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
             vec![set("theta_step_deg", theta_step_deg), set("phi_step_deg", phi_step_deg)]
         }
         Schedule::LowDiscrepancy { count } => vec![Change::set("schedule", "count", count)],
+        Schedule::Quadrature { theta_count, phi_count, .. } => vec![
+            Change::set("schedule", "theta_count", theta_count),
+            Change::set("schedule", "phi_count", phi_count),
+        ],
         Schedule::Sweep { phi_step_deg, speed_deg_per_s, narrowest_feature_deg, .. } => {
             let mut changes = vec![set("phi_step_deg", phi_step_deg)];
             changes.extend(speed_deg_per_s.map(|speed| set("speed_deg_per_s", speed)));

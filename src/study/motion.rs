@@ -44,6 +44,7 @@ impl Motion {
             Schedule::CGamma { .. }
             | Schedule::List { .. }
             | Schedule::LowDiscrepancy { .. }
+            | Schedule::Quadrature { .. }
             | Schedule::Raster { .. } => Self::StopAndGo,
         }
     }
@@ -77,6 +78,11 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
         Schedule::Raster { x_count, y_count, theta_step_deg, phi_step_deg } => {
             ((x_count, y_count), phi_step_deg, theta_step_deg)
         }
+        Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
+            // The nodes lie closest to the edge; their mean distance is what they resolve.
+            let theta_step_deg = plan.region.theta_max_rad.to_degrees() / f64::from(theta_count);
+            ((x_count, y_count), 360.0 / f64::from(phi_count), theta_step_deg)
+        }
         Schedule::LowDiscrepancy { .. } => {
             // A polynomial of degree n has n waves round the circle: 2n + 1 meridians, made even.
             let step = |degree: usize| 360.0 / (2 * (degree + 1)) as f64;
@@ -88,7 +94,15 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
     // What the grid resolves where the plan doesn't say what there is to resolve.
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
     let narrowest_feature_deg = declared.unwrap_or(2.0 * theta_step_deg);
-    let gone = ["count", "theta_step_deg", "gamma_step_deg", "c_step_deg", "order"];
+    let gone = [
+        "count",
+        "theta_count",
+        "phi_count",
+        "theta_step_deg",
+        "gamma_step_deg",
+        "c_step_deg",
+        "order",
+    ];
     let mut changes: Vec<Change> =
         gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
     changes.push(Change::set("schedule", "kind", "\"sweep\""));
@@ -115,6 +129,8 @@ fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
     let narrowest_feature_deg = declared.or(narrowest_feature_deg).unwrap_or(phi_step_deg);
     let mut changes: Vec<Change> = [
         "count",
+        "theta_count",
+        "phi_count",
         "theta_step_deg",
         "gamma_step_deg",
         "c_step_deg",

@@ -1,7 +1,8 @@
 //! The cheapest plan that reaches an accuracy, among those that a person would try: the plan's own
 //! schedule denser or thinner, with its fit's degree or with one that goes with the density; sweeps
-//! instead of a grid where the plan says how narrow its features are; each with the shortest dwell
-//! that does.
+//! instead of a grid where the plan says how narrow its features are; the nodes of a quadrature rule
+//! where exitance and flux are all that is asked; each with the shortest dwell that does, and with
+//! longer dark readings where the dark level is what stands in the way.
 //!
 //! Every candidate is the plan's own text with some keys changed, read and laid out again: what is
 //! found is what is written.
@@ -22,6 +23,12 @@ const DWELL_MS_MAX: f64 = 1000.0;
 const READINGS_MIN: f64 = 2.0;
 /// A dwell that does not fit the rig (a sweep's, say) is tried longer or shorter by this factor.
 const DWELL_STEP: f64 = 4.0;
+/// Degrees of fits at the nodes of quadrature rules, and in position where the plan says none.
+const QUADRATURE_DEGREES: [usize; 7] = [2, 4, 6, 8, 12, 16, 20];
+const QUADRATURE_POSITION_DEGREE: usize = 1;
+/// Dark readings are lengthened by this factor, up to so many milliseconds.
+const DARK_LONGER: f64 = 4.0;
+const DARK_MS_MAX: f64 = 120_000.0;
 /// How often a dwell is corrected after it was interpolated, and by how much.
 const CORRECTIONS: u32 = 4;
 const CORRECTION: f64 = 1.1;
@@ -105,7 +112,8 @@ impl Search<'_> {
             floor: None,
         };
         let mut nearest = itself;
-        for variant in self.variants() {
+        let mut variants = std::collections::VecDeque::from(self.variants());
+        while let Some(variant) = variants.pop_front() {
             if found.best.as_ref().is_some_and(|best| variant.least_s >= best.time_s) {
                 found.dearer += 1;
                 continue;
@@ -116,8 +124,10 @@ impl Search<'_> {
                 if found.best.as_ref().is_none_or(|best| candidate.time_s < best.time_s) {
                     found.best = Some(candidate);
                 }
-            } else if self.demand.ratio(&candidate.forecast) < self.demand.ratio(&nearest.forecast)
-            {
+                continue;
+            }
+            variants.extend(self.in_longer_dark(&variant, &candidate));
+            if self.demand.ratio(&candidate.forecast) < self.demand.ratio(&nearest.forecast) {
                 nearest = candidate;
             }
         }
@@ -162,18 +172,77 @@ impl Search<'_> {
                 break;
             }
         }
-        let mut variants: Vec<Variant> = variants
-            .into_iter()
-            .filter_map(|(what, changes)| {
-                let (plan, _) = self.with(&changes, self.dwell_ms_min())?;
-                let sequence = plan.lay_out(self.rig, self.list).ok();
-                // Windows this short may be more than the wire carries: no reason to leave it out.
-                let least_s = sequence.map_or(0.0, |s| s.prediction.total_s());
-                Some(Variant { what, changes, least_s })
-            })
-            .collect();
+        variants.extend(self.quadratures());
+        let of = |(what, changes)| self.variant(what, changes);
+        let mut variants: Vec<Variant> = variants.into_iter().filter_map(of).collect();
         variants.sort_by(|a, b| a.least_s.total_cmp(&b.least_s));
         variants
+    }
+
+    fn variant(&self, what: String, changes: Vec<Change>) -> Option<Variant> {
+        let (plan, _) = self.with(&changes, self.dwell_ms_min())?;
+        let sequence = plan.lay_out(self.rig, self.list).ok();
+        // Windows this short may be more than the wire carries: no reason to leave it out.
+        let least_s = sequence.map_or(0.0, |s| s.prediction.total_s());
+        Some(Variant { what, changes, least_s })
+    }
+
+    /// Product rules, and fits of the degrees whose squares they integrate: the fit's exitance is then
+    /// the rule's, and right for fields of twice its degree.
+    fn quadratures(&self) -> Vec<(String, Vec<Change>)> {
+        let is_sum = self.demand.radiance.is_none();
+        let is_grid = !matches!(
+            self.plan.schedule,
+            Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Quadrature { .. }
+        );
+        if !(is_sum && is_grid) {
+            return Vec::new();
+        }
+        let places = self.plan.fit.position_degree.unwrap_or(QUADRATURE_POSITION_DEGREE) + 1;
+        let of = |degree: usize| {
+            let (theta_count, phi_count) = (degree / 2 + 1, 2 * degree + 2);
+            let gone = [
+                "count",
+                "theta_step_deg",
+                "gamma_step_deg",
+                "c_step_deg",
+                "phi_step_deg",
+                "speed_deg_per_s",
+                "narrowest_feature_deg",
+            ];
+            let mut changes: Vec<Change> =
+                gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
+            changes.push(Change::set("schedule", "kind", "\"quadrature\""));
+            changes.push(Change::set("schedule", "x_count", places));
+            changes.push(Change::set("schedule", "y_count", places));
+            changes.push(Change::set("schedule", "theta_count", theta_count));
+            changes.push(Change::set("schedule", "phi_count", phi_count));
+            changes.push(Change::set("fit", "angular_degree", degree));
+            changes.push(Change::set("fit", "position_degree", places - 1));
+            (format!("quadrature {theta_count} x {phi_count}, degree {degree}"), changes)
+        };
+        QUADRATURE_DEGREES.into_iter().map(of).collect()
+    }
+
+    /// The variant with longer dark readings, where it misses by the dark level most.
+    fn in_longer_dark(&self, variant: &Variant, missing: &Candidate) -> Option<Variant> {
+        let most = self.demand.shortfall(&missing.forecast)?;
+        let known = variant.changes.iter().find(|change| change.table == "dark");
+        let dark_ms = match known.and_then(|change| change.value.as_ref()?.parse().ok()) {
+            Some(dark_ms) => dark_ms,
+            None => ms(self.plan.dark.dwell),
+        } * DARK_LONGER;
+        if !most.largest.starts_with("dark") || dark_ms > DARK_MS_MAX {
+            return None;
+        }
+        let what = match variant.what.split_once(", dark") {
+            Some((what, _)) => what,
+            None => &variant.what,
+        };
+        let mut changes: Vec<Change> =
+            variant.changes.iter().filter(|change| change.table != "dark").cloned().collect();
+        changes.push(Change::set("dark", "dwell_ms", dark_ms));
+        self.variant(format!("{what}, dark {} s", dark_ms / 1e3), changes)
     }
 
     /// Sweeps along meridians instead of a grid of directions, where the plan says how narrow its
