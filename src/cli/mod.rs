@@ -50,6 +50,7 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 use args::{Cli, Command, Study};
+pub use frontier::panels as arithmetic_panels;
 
 /// Parses the process's arguments and does what they ask.
 pub fn main() -> ExitCode {

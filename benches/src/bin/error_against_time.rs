@@ -10,8 +10,9 @@ use std::process::ExitCode;
 
 use benches::{Arguments, Section, Table, Unmeasured, report};
 use clap::Parser;
+use gonio::cli::arithmetic_panels;
 use gonio::cli::stopwatch::call_s;
-use gonio::report::{Curve, Panel, error_against_time};
+use gonio::report::error_against_time;
 use gonio::study::arithmetic::{Effort, METHODS, STUDIES, Spot, fastest, sweep};
 
 /// Error against time of closed form, adaptive, quasi-Monte Carlo and Monte Carlo.
@@ -39,22 +40,9 @@ fn measure(asked: &Asked) -> Result<Section, Unmeasured> {
     let spots = sweep(Effort { seeds: asked.seeds, longest_s: LONGEST_S }, call_s)?;
     if let Some(path) = &asked.figure {
         let title = "One value by closed form, adaptive, quasi-Monte Carlo and Monte Carlo";
-        std::fs::write(path, error_against_time(title, &panels(&spots), 3))?;
+        std::fs::write(path, error_against_time(title, &arithmetic_panels(&spots), 3))?;
     }
     Ok(section(&spots, asked))
-}
-
-fn panels(spots: &[Spot]) -> Vec<Panel> {
-    let curve = |study: &str, method: &str| {
-        let points = spots.iter().filter(|spot| spot.study == study && spot.method == method);
-        let points: Vec<_> = points.map(|spot| (spot.seconds, spot.error)).collect();
-        (!points.is_empty()).then(|| Curve { name: method.to_owned(), points, is_joined: true })
-    };
-    let panel = |(study, _): &(&str, _)| Panel {
-        title: (*study).to_owned(),
-        curves: METHODS.iter().filter_map(|method| curve(study, method)).collect(),
-    };
-    STUDIES.iter().map(panel).collect()
 }
 
 fn section(spots: &[Spot], asked: &Asked) -> Section {

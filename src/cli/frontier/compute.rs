@@ -111,7 +111,8 @@ fn methods(spots: &[Spot]) -> Vec<&str> {
     names
 }
 
-fn panels(spots: &[Spot]) -> Vec<Panel> {
+/// A panel for each quantity, a curve for each method: the kernel's, the others, and peers.
+pub fn panels(spots: &[Spot]) -> Vec<Panel> {
     let curve = |study: &str, method: &str| {
         // A peer may have several ways to answer; each is a curve's mark, and time rises along it.
         let points = spots.iter().filter(|spot| spot.study == study && spot.method == method);

@@ -28,6 +28,8 @@ mod compute;
 mod rungs;
 mod words;
 
+pub use compute::panels;
+
 /// Runs every rung of every strategy, and times the kernels where that is asked; writes tables, pictures
 /// and pages, and prints the tables.
 pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
