@@ -472,6 +472,7 @@ impl Estimate {
 }
 
 /// The budget's name for what the basis can't follow.
-const TRUNCATION: &str = "truncation";
+/// The name of what the functions can't follow among contributions.
+pub const TRUNCATION: &str = "truncation";
 /// The budget's name for what is independent from reading to reading.
 const INDEPENDENT: &str = "independent";

@@ -49,7 +49,7 @@ pub use chart::{Chart, Face};
 pub use choice::{AngularKind, Candidate, Choice, SweepKind, Wish, choose};
 pub use coverage::Coverage;
 pub use error::FitError;
-pub use fitted::{Contribution, Estimate, Fit};
+pub use fitted::{Contribution, Estimate, Fit, TRUNCATION};
 pub use functional::Functional;
 pub use influence::Influence;
 pub use nonnegative::Nonnegative;

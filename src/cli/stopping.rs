@@ -89,7 +89,7 @@ impl Target {
 
     fn so_far(&mut self, rig_s: f64) -> Option<Said> {
         let calibrated = calibrate(&self.rig, &self.readings).ok()?;
-        let trend = Trend::of(rig_s, &self.fitted(&calibrated)?.fit.exitance())?;
+        let trend = Trend::of_exitance(rig_s, &self.fitted(&calibrated)?.fit)?;
         let Self { asked, targets, planned, .. } = *self;
         Some(match asked {
             Some(asked) if trend.u() <= asked => Said::Enough(format!(
@@ -134,7 +134,7 @@ pub(crate) fn as_json(trend: &Trend, setup: &Setup) -> serde_json::Value {
         Reach::Never => None,
     });
     serde_json::json!({
-        "u_relative": trend.u(), "u_relative_shared": trend.shared,
+        "u_relative": trend.u(), "u_relative_lasting": trend.lasting,
         "u_relative_after_twice_the_time": trend.after(2.0),
         "target_relative": asked, "target_rig_s": target_s,
     })

@@ -79,7 +79,7 @@ impl Summary<'_> {
                 format!("{whole} (k = 1), its part not shared by all readings {independent}"),
             ));
         }
-        if let Some(trend) = Trend::of(self.rig_s, &exitance) {
+        if let Some(trend) = Trend::of_exitance(self.rig_s, fit) {
             rows.push(row("more time", stopping::in_words(&trend, self.setup)));
         }
         if let Some(truth) = self.results.truth.filter(|truth| truth.exitance > 0.0) {
@@ -128,7 +128,7 @@ impl Summary<'_> {
                     "value": exitance.value, "u": exitance.u, "u_independent": exitance.u_independent,
                     "measured_fraction": fitted.fit.measured_fraction(),
                 });
-                if let Some(trend) = Trend::of(self.rig_s, &exitance) {
+                if let Some(trend) = Trend::of_exitance(self.rig_s, &fitted.fit) {
                     object["accuracy"] = stopping::as_json(&trend, setup);
                 }
                 object[quantity.flux_key()] = json!({"value": flux.value, "u": flux.u});
@@ -368,7 +368,12 @@ pub(crate) fn field_rows(fit: &Fit, quantity: Quantity) -> Vec<Vec<String>> {
         rows.push(row("exitance", with_uncertainty(exitance.value, exitance.u, exitance_unit)));
         if let Some(fraction) = fit.measured_fraction() {
             let name = format!("  within {:.0}°", fit.region().theta_max_rad.to_degrees());
-            rows.push(row(&name, format!("{} of the exitance", percent(fraction))));
+            let within = fit.exitance_within_region();
+            let said = with_uncertainty(within.value, within.u, exitance_unit);
+            rows.push(row(
+                &name,
+                format!("{said}; {} of the exitance was measured", percent(fraction)),
+            ));
         }
         rows.push(row("flux", with_uncertainty(flux.value, flux.u, flux_unit)));
     } else {

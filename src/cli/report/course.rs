@@ -225,13 +225,18 @@ pub(super) fn accuracy(setup: &Setup, results: &Results) -> Option<Section> {
 
 /// What twice the time would buy, and what the plan's target would cost.
 fn outlook(results: &Results, last: &AccuracyPoint, target: Option<f64>) -> Vec<String> {
-    let Some(trend) = Trend::of(last.rig_s, &last.exitance) else { return Vec::new() };
+    let trend = match &results.fitted {
+        Ok(fitted) => Trend::of_exitance(last.rig_s, &fitted.fit),
+        Err(_) => Trend::of(last.rig_s, &last.exitance),
+    };
+    let Some(trend) = trend else { return Vec::new() };
     let mut said = vec![format!(
-        "After {} the uncertainty is {}, of which {} is shared by all readings. Twice the time would \
-         bring {}, if the independent part goes on to fall as the square root of time.",
+        "After {} the uncertainty is {}, of which more readings of the same kind leave {}: what \
+         they all share, and what the fit's functions can't follow. Twice the time would bring {}, if the \
+         rest goes on to fall as the square root of time.",
         duration(last.rig_s),
         percent(trend.u()),
-        percent(trend.shared),
+        percent(trend.lasting),
         percent(trend.after(2.0))
     )];
     if let Some(target) = target {
@@ -239,8 +244,8 @@ fn outlook(results: &Results, last: &AccuracyPoint, target: Option<f64>) -> Vec<
         said.push(match trend.reach(target) {
             Reach::Met => format!("The plan's target of {asked} is met."),
             Reach::Never => format!(
-                "The plan's target of {asked} can't be met by more time: what all readings \
-                 share is more than that."
+                "The plan's target of {asked} can't be met by more time: what more readings \
+                 leave is more than that."
             ),
             Reach::At(seconds) => format!(
                 "The plan's target of {asked} would be met after about {} by the same rule.",
