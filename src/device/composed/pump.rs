@@ -53,15 +53,11 @@ pub(in crate::device) async fn pump(
     let mut served: Option<tokio::time::Instant> = None;
     loop {
         let now = Instant::ZERO + origin.elapsed();
-        for (n, port) in ports.iter_mut().enumerate() {
-            // One piece at a time: what stops the axes waits for no more than that.
-            if port.outgoing.is_empty()
-                && let Some(bytes) = composer.poll_transmit(now, n)
-            {
-                port.outgoing = bytes;
-            }
-        }
         composer.listen(now);
+        // What was due by now may have led to words: nothing else would wake us for them.
+        while load(&mut ports, &mut composer, now) {
+            composer.listen(now);
+        }
         while let Some(word) = composer.poll_said() {
             let _ = said.send(word);
         }
@@ -106,6 +102,19 @@ pub(in crate::device) async fn pump(
             }
         }
     }
+}
+
+/// Takes the next words for every port that is free; whether there were any. One piece at a time:
+/// what stops the axes waits for no more than that.
+fn load(ports: &mut [Port], composer: &mut Composer, now: Instant) -> bool {
+    let mut is_loaded = false;
+    for (n, port) in ports.iter_mut().enumerate().filter(|(_, port)| port.outgoing.is_empty()) {
+        if let Some(bytes) = composer.poll_transmit(now, n) {
+            is_loaded |= !bytes.is_empty();
+            port.outgoing = bytes;
+        }
+    }
+    is_loaded
 }
 
 /// What the next port has to say; `None` where one has written what it had.
