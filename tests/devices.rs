@@ -194,3 +194,50 @@ fn a_meter_in_another_unit_and_garbage_are_refused_when_they_are_reached() {
     }
     assert_eq!(bench.names(), before);
 }
+
+#[test]
+fn another_session_s_meter_has_other_noise() {
+    let fault = "\n[[simulated.fault]]\ndevice = \"keithley-6485\"\nkind = \"mute\"\nnth = 90\n";
+    let bench = on_devices();
+    let rig = bench.text("rig.toml");
+    let bench = bench.having("rig.toml", rig + fault);
+    assert_eq!(bench.gonio(&["run", "plan.toml", "--out", "run"]).code, Some(1));
+    bench.gonio(&["resume", "run", "--accept-drift"]).well();
+    let readings = table(&bench, "run/readings.csv");
+    let kind = readings.1.iter().position(|head| head == "kind").unwrap();
+    let (means, sessions) = (readings.of("mean_counts"), readings.of("session"));
+    let looks = |session: f64| -> Vec<f64> {
+        let rows = readings.0.iter().zip(&means).zip(&sessions);
+        let those =
+            rows.filter(|((row, _), of)| row[kind] == "reference" && (**of - session).abs() < 0.5);
+        those.map(|((_, mean), _)| *mean).collect()
+    };
+    let (first, second) = (looks(0.0), looks(1.0));
+    assert!(first.len() > 1 && second.len() > 1, "{first:?} {second:?}");
+    assert!(second.iter().all(|mean| !first.contains(mean)), "{first:?} {second:?}");
+}
+
+#[test]
+fn what_a_plan_would_take_in_flight_is_foretold_at_rest() {
+    let schedule = "kind = \"raster\"\nx_count = 2\ny_count = 2\ntheta_step_deg = 20\n\
+                    phi_step_deg = 45\norder = \"travel\"\n";
+    let sweep = "kind = \"sweep\"\nx_count = 1\ny_count = 1\nphi_step_deg = 45\n\
+                 narrowest_feature_deg = 60\n";
+    let bench = on_devices().with("plan.toml", schedule, sweep).with(
+        "plan.toml",
+        "position_degree = 1",
+        "position_degree = 0",
+    );
+    let plan = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    assert_eq!(plan["sweeps"]["at_rest"], true);
+    let said = bench.gonio(&["plan", "plan.toml"]).well();
+    assert!(said.out.contains("at rest, window by window"), "{said}");
+    let run = bench.gonio(&["run", "plan.toml", "--out", "run", "--json"]).well().json();
+    // What the devices say in between is not foretold: here 40 readings a window, at 57600 baud.
+    let foretold = plan["time_s"]["total"].as_f64().unwrap();
+    let homing = plan["time_s"]["homing"].as_f64().unwrap();
+    let took = run["rig_s"].as_f64().unwrap();
+    let readings = plan["readings"].as_f64().unwrap();
+    let beyond = (took - foretold) / readings;
+    assert!(readings > 20.0 && beyond < 0.3 && took > foretold - homing, "{took}, {foretold}");
+}

@@ -94,12 +94,13 @@ impl SimulatedBoard {
     }
 
     /// A name for a reading that its meter has none for: by where the axes were sent, the range,
-    /// the shutter, and how often such a reading was named before. Noise is keyed by names, and so
-    /// depends on what was measured, and not on when.
+    /// the shutter, and how often such a reading was named before in this boot. Noise is keyed by
+    /// names, and so depends on what was measured, and not on when.
     #[allow(clippy::cast_possible_truncation)] // a number among 2^32
     pub fn name_reading(&mut self, gain: u8) -> u32 {
         let closed = u64::from(self.shutter == Shutter::Closed);
-        let place = self.axes.iter().fold(u64::from(gain) << 1 | closed, |key, axis| {
+        let boot = u64::from(self.boot_id) << 32;
+        let place = self.axes.iter().fold(boot | u64::from(gain) << 1 | closed, |key, axis| {
             mix(key ^ u64::from(axis.readback(Instant::ZERO, false).cast_unsigned()))
         });
         let visits = self.visits.entry(place).or_default();

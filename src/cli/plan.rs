@@ -132,6 +132,14 @@ fn sweeps(setup: &Setup) -> Option<String> {
     let window = sequence.steps.iter().find(|step| step.swept.is_some())?;
     let [theta, ..] = sequence.speeds(rig);
     let travel = rig.axes[0].position(f64::from(window.swept?.travel.0[0])).abs();
+    if rig.takes_sweeps_at_rest() {
+        return Some(format!(
+            "{}, but this rig's devices take no reading in flight: at rest, window by window, \
+             {:.1} ms each",
+            sequence.sweeps(),
+            window.dwell.as_secs_f64() * 1e3,
+        ));
+    }
     Some(format!(
         "{} at {:.2}°/s, windows of {:.1} ms and {:.3}°",
         sequence.sweeps(),
@@ -167,6 +175,7 @@ fn as_json(
         "readings": prediction.readings,
         "sweeps": {
             "count": setup.sequence.sweeps(),
+            "at_rest": setup.rig.takes_sweeps_at_rest(),
             "speed_deg_per_s": setup.sequence.speeds(&setup.rig)[0].to_degrees(),
         },
         "travel": {

@@ -101,6 +101,7 @@ fn status_text(status: &Status, runs: &[Run]) -> String {
         row("state", status.state.clone()),
         row("position", status.position.clone()),
     ];
+    rows.extend(status.watchdogs.iter().map(|words| row("if silent", words.clone())));
     if let Some(run) = &status.current_run {
         let progress = run.progress;
         rows.push(row("run", format!("{} ({})", run.id, run.name)));

@@ -73,8 +73,12 @@ pub(crate) fn what_is_left(journal: &Path) -> Result<(Setup, Remainder), Failure
             "use the version of gonio that began it",
         ));
     }
-    let setup = setup.with_rounds(&reader)?;
+    let mut setup = setup.with_rounds(&reader)?;
     let left = remainder(&reader.steps()?, &reader.readings(Order::Taken)?, &reader.sessions()?);
+    // A meter knows no names of readings: what it reads in another session has other noise.
+    if let Some(stage) = &mut setup.stage {
+        stage.boot = stage.boot.saturating_add(left.session);
+    }
     Ok((setup, left))
 }
 

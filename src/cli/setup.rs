@@ -25,6 +25,8 @@ pub(crate) struct Stage {
     pub(crate) compiled: Arc<sim::Compiled>,
     pub(crate) faults: sim::LinkFaults,
     pub(crate) device_faults: Vec<sim::DeviceFault>,
+    /// For the how-manieth time devices of other makes are switched on for this run.
+    pub(crate) boot: u32,
     pub(crate) seed: u64,
 }
 
@@ -362,7 +364,7 @@ fn compile(scene: sim::Scene, rig: &Rig, terms: &sim::Terms) -> Result<Stage, Fa
     let (faults, device_faults) = (simulated.faults, simulated.device_faults.clone());
     let compiled = sim::compile(scene, nominal(rig), simulated, terms)
         .map_err(|error| refused(&error, rig))?;
-    Ok(Stage { compiled: Arc::new(compiled), faults, device_faults, seed: terms.seed })
+    Ok(Stage { compiled: Arc::new(compiled), faults, device_faults, boot: 1, seed: terms.seed })
 }
 
 /// Where what can't be compiled was written: in the rig's file, in the scene's, or on the command line.

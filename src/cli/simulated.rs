@@ -73,7 +73,7 @@ impl SimulatedDevices {
     pub(crate) fn switch_on(stage: &Stage, devices: &Devices) -> Self {
         let (streams, mut waiting) = mpsc::unbounded_channel::<(usize, DuplexStream)>();
         let there = twins::of(devices);
-        let mut bench = twins::bench(stage, &there, OWN_BOOT);
+        let mut bench = twins::bench(stage, &there, stage.boot);
         let names = there.iter().map(|line| format!("simulated {}", line.name())).collect();
         let lines = bench.lines();
         tokio::spawn(async move {

@@ -46,8 +46,9 @@ pub struct StepTime {
 
 impl StepTime {
     /// Of a step that begins at `from`. A sweep's windows take their own time; its first one also
-    /// what comes before it, its last one the braking.
+    /// what comes before it, its last one the braking. A rig that rests takes them like any other.
     pub fn of(rig: &Rig, from: Latched, step: &Step) -> Self {
+        let step = &taken(rig, step);
         if step.swept.is_some() {
             return Self::of_window(rig, from, step);
         }
@@ -130,6 +131,7 @@ impl Prediction {
     }
 
     fn travel(&mut self, rig: &Rig, from: Latched, step: &Step) {
+        let step = &taken(rig, step);
         let via = step.via.unwrap_or(step.counts);
         for (i, axis) in rig.axes.iter().enumerate() {
             let leg = |a: i32, b: i32| (f64::from(a) - f64::from(b)).abs();
@@ -138,6 +140,11 @@ impl Prediction {
             self.travel[i] += axis.position(counts);
         }
     }
+}
+
+/// The step as this rig takes it.
+fn taken(rig: &Rig, step: &Step) -> Step {
+    if rig.takes_sweeps_at_rest() { step.at_rest() } else { *step }
 }
 
 /// What steps take, one after the other from `here`, seconds.

@@ -100,6 +100,9 @@ impl Step {
 
     /// Where the axes come to rest after it, if it is the last window of its sweep or none.
     pub fn rests_at(&self, rig: &Rig) -> Latched {
+        if rig.takes_sweeps_at_rest() {
+            return self.at_rest().counts;
+        }
         let is_last = |swept: &Swept| self.id + 1 == swept.first + swept.count;
         let motion = self.swept.filter(is_last).and(self.flight(1));
         let motion = motion.and_then(|flight| rig.flight(flight).ok());

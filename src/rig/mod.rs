@@ -64,6 +64,12 @@ impl Rig {
         matches!(self.link, Link::Simulated { .. })
     }
 
+    /// Whether what a plan would take in flight is taken at rest: a meter of another make does not
+    /// integrate while axes pass.
+    pub fn takes_sweeps_at_rest(&self) -> bool {
+        self.devices.is_some()
+    }
+
     /// Whether a shutter can be closed before the detector. A controller of gonio's own has one; of
     /// other devices the file says which.
     pub fn has_shutter(&self) -> bool {

@@ -131,6 +131,7 @@ fn after_a_kill_nothing_moves_before_a_person_says_so_and_nothing_is_measured_tw
     let status = daemon.get("/status").1;
     assert_eq!((&status["state"], &status["interrupted_runs"]), (&json!("idle"), &json!([1])));
     assert_eq!(status["position_trusted"], false);
+    assert!(status["watchdogs"][0].as_str().unwrap().contains("lease"), "{status}");
     assert_eq!(daemon.state_of(2), "queued");
 
     let (_, asked) = daemon.post("/runs/1/continue", "");

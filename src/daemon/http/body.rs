@@ -35,6 +35,9 @@ pub struct Status {
     pub position_trusted: bool,
     /// The evidence for it, or against it.
     pub position: String,
+    /// What stops the axes when this program falls silent, device by device.
+    #[serde(default)]
+    pub watchdogs: Vec<String>,
     /// What is wrong, if the rig stands still because of it.
     pub fault: Option<String>,
     /// What a person is asked to do before continuing.

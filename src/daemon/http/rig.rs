@@ -14,7 +14,9 @@ use crate::daemon::hand::{Hand, Handled, Jog};
 use crate::daemon::notice::Progress;
 use crate::daemon::question;
 use crate::daemon::workshop::Workshop;
+use crate::device::Composer;
 use crate::journal::QueueState;
+use crate::rig::Rig;
 
 /// As long as a plan may dwell.
 const DWELL_MS_MAX: f64 = 600_000.0;
@@ -51,6 +53,7 @@ pub(super) async fn status<W: Workshop>(State(desk): Shared<W>) -> Answer<Status
         .to_owned(),
         position_trusted: now.position.is_trusted(),
         position: now.position.to_string(),
+        watchdogs: watchdogs(rig),
         fault: now.fault.as_ref().map(ToString::to_string),
         question: now.asked.map(|source| question(source).to_owned()),
         eta_s: current_run.as_ref().and_then(|run| run.progress.eta_s),
@@ -60,6 +63,11 @@ pub(super) async fn status<W: Workshop>(State(desk): Shared<W>) -> Answer<Status
         latest_event,
         version: env!("CARGO_PKG_VERSION").to_owned(),
     }))
+}
+
+fn watchdogs(rig: &Rig) -> Vec<String> {
+    let own = || vec!["gonio's own controller: stops by itself when its lease ends".to_owned()];
+    Composer::of(rig, 0).map_or_else(own, |composer| composer.watchdogs())
 }
 
 /// Find the home marks of all axes. Only while no run has the rig.

@@ -67,6 +67,19 @@ impl Composer {
         axes.chain([meter]).map(|driver| (driver.name().to_owned(), driver.promises())).collect()
     }
 
+    /// Which of its devices stop by themselves when the host falls silent, in words: the meter
+    /// moves nothing.
+    pub fn watchdogs(&self) -> Vec<String> {
+        let words = |part: &Part| {
+            let watchdog = part.driver.promises().watchdog.map_or_else(
+                || "no device watchdog".to_owned(),
+                |after| format!("stops by itself after {} ms of silence", after.as_millis()),
+            );
+            format!("{}: {watchdog}", part.driver.name())
+        };
+        self.parts.iter().map(words).collect()
+    }
+
     /// How many ports it needs: one for each device that moves axes, and the meter's as the last.
     pub(super) fn ports(&self) -> usize {
         self.parts.len() + 1
