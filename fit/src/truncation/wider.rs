@@ -148,8 +148,8 @@ impl Wider<'_> {
         let below = joint.solution.rotated(0).split_off(self.known());
         let alone = Likeliest::alone(rest + dot(&below, &below), free, &scales);
         let tried = |hold: Hold| {
-            let shares = Shares::of(&joint.solution, self.known(), &self.root(hold, &self.kept)?)?;
-            let found = shares.likeliest(rest, free, &scales);
+            let shares = Shares::of(&joint.solution, self.known(), &self.root(hold, &self.kept)?);
+            let found = shares.and_then(|shares| shares.likeliest(rest, free, &scales));
             Ok::<_, FitError>(found.map(|found| Likeliest { hold, ..found }))
         };
         let mut best = Likeliest { ..alone };
