@@ -16,6 +16,8 @@ use crate::device::controller::{LinkLost, Order, Said};
 
 /// Read at a time, bytes.
 const READ_BYTES: usize = 1024;
+/// Taken from a port before a time-out is served: one that never ends must not put it off.
+const PIECES: usize = 16;
 /// A wake-up that is due still after it was served comes again so much later: a driver that forgets to
 /// put its time-out off must not keep bytes and stops from being heard.
 const LULL: Duration = Duration::from_millis(1);
@@ -87,18 +89,14 @@ pub(in crate::device) async fn pump(
                     return;
                 }
                 served = Some(tokio::time::Instant::now());
-                composer.handle_timeout(Instant::ZERO + origin.elapsed());
+                let now = Instant::ZERO + origin.elapsed();
+                for (n, heard) in arrived(&mut ports).await {
+                    hand_over(&mut composer, &ports, now, n, heard);
+                }
+                composer.handle_timeout(now);
             }
             (n, heard) = next(&mut ports) => {
-                let now = Instant::ZERO + origin.elapsed();
-                match heard {
-                    Some(Heard::Bytes(bytes)) => composer.handle_bytes(now, n, &bytes),
-                    Some(Heard::Gone(detail)) => {
-                        let port = ports.get(n).map(|port| port.name.clone()).unwrap_or_default();
-                        composer.port_gone(now, n, LinkLost::HungUp { port, detail });
-                    }
-                    None => {}
-                }
+                hand_over(&mut composer, &ports, Instant::ZERO + origin.elapsed(), n, heard);
             }
         }
     }
@@ -128,6 +126,41 @@ async fn next(ports: &mut [Port]) -> (usize, Option<Heard>) {
         Poll::Pending
     })
     .await
+}
+
+/// What has come by now on all ports. A host that was busy elsewhere wakes with answers and
+/// time-outs both due: whoever has answered must not be called silent.
+async fn arrived(ports: &mut [Port]) -> Vec<(usize, Option<Heard>)> {
+    // The runtime learns of bytes where a task lets it look.
+    tokio::task::yield_now().await;
+    let all = poll_fn(|context| {
+        let pieces = ports.iter_mut().enumerate().flat_map(|(n, port)| {
+            let piece = |_| match port.poll(context) {
+                Poll::Ready(heard) => Some((n, heard)),
+                Poll::Pending => None,
+            };
+            (0..PIECES).map_while(piece).collect::<Vec<_>>()
+        });
+        Poll::Ready(pieces.collect())
+    });
+    all.await
+}
+
+fn hand_over(
+    composer: &mut Composer,
+    ports: &[Port],
+    now: Instant,
+    n: usize,
+    heard: Option<Heard>,
+) {
+    match heard {
+        Some(Heard::Bytes(bytes)) => composer.handle_bytes(now, n, &bytes),
+        Some(Heard::Gone(detail)) => {
+            let port = ports.get(n).map(|port| port.name.clone()).unwrap_or_default();
+            composer.port_gone(now, n, LinkLost::HungUp { port, detail });
+        }
+        None => {}
+    }
 }
 
 impl Port {

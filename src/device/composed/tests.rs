@@ -45,8 +45,14 @@ impl Driver for Puppet {
     fn open(&mut self, _now: Instant) {
         self.note("open".into());
     }
-    fn handle_bytes(&mut self, _now: Instant, _bytes: &[u8]) {}
-    fn handle_timeout(&mut self, _now: Instant) {}
+    fn handle_bytes(&mut self, _now: Instant, bytes: &[u8]) {
+        self.note(format!("{} bytes", bytes.len()));
+    }
+    fn handle_timeout(&mut self, _now: Instant) {
+        if self.0.lock().unwrap().is_due {
+            self.note("due".into());
+        }
+    }
     fn poll_transmit(&mut self, _now: Instant) -> Option<Vec<u8>> {
         None
     }
@@ -413,4 +419,24 @@ async fn a_driver_that_is_always_due_keeps_nobody_from_ending_it() {
     drop(orders);
     // Simulated time goes on, which it does not while a task never rests.
     tokio::time::timeout(std::time::Duration::from_mins(1), pump).await.unwrap().unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_answer_that_is_there_is_heard_before_a_time_out_that_is_due() {
+    use tokio::io::AsyncWriteExt as _;
+
+    let play = Play::new();
+    play.arm.0.lock().unwrap().is_due = true;
+    let (mut device, host) = tokio::io::duplex(64);
+    device.write_all(b"late").await.unwrap();
+    let links = vec![crate::device::Link::new("port", host)];
+    let (orders, to_pump) = tokio::sync::mpsc::unbounded_channel();
+    let (from_pump, _said) = tokio::sync::mpsc::unbounded_channel();
+    let pump = tokio::spawn(super::pump::pump(play.composer, links, to_pump, from_pump));
+    tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+    drop(orders);
+    pump.await.unwrap();
+    let told = play.arm.told();
+    assert_eq!(told.first().map(String::as_str), Some("4 bytes"), "{told:?}");
+    assert!(told.contains(&"due".to_owned()));
 }
