@@ -87,6 +87,24 @@ fn over_terminals_a_killed_run_is_resumed_and_a_meter_that_is_unplugged_ends_it(
     twins::each_once(&bench);
 }
 
+/// As on a machine that is busy with other things, or behind an adapter that hands bytes on late.
+#[test]
+fn devices_that_answer_late_again_and_again_cost_time_and_nothing_else() {
+    let bench = twins::at_ports(small(), &DRIVERS);
+    let sim = Devices::switched_on(&bench, &DRIVERS);
+    let mut run = twins::start(&bench, &["run", "plan.toml", "--out", "run"]);
+    let mut held_up = 0;
+    while run.0.try_wait().unwrap().is_none() {
+        // At moves and rest, by turns; an answer was called lost after 120 ms once.
+        std::thread::sleep(std::time::Duration::from_millis(150 + held_up * 37 % 300));
+        sim.hold_up(std::time::Duration::from_millis(300));
+        held_up += 1;
+    }
+    twins::end(run).well();
+    assert!(held_up > 10, "{held_up}");
+    twins::each_once(&bench);
+}
+
 #[test]
 fn what_is_wrong_with_servos_or_meter_is_found_before_anything_moves() {
     let cases: [(&str, &str, &[&str]); 7] = [

@@ -1,7 +1,7 @@
 //! Simulated devices of other makes at pseudo-terminals, as a process of their own, and runs on them.
 
 use std::io::{BufRead as _, BufReader, Read as _};
-use std::process::{Child, ChildStdout, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -61,6 +61,17 @@ impl Devices {
             assert_eq!(line.trim(), *driver);
         }
         Self { process, _said: said }
+    }
+
+    /// Holds them up for so long, and lets them go again.
+    pub(crate) fn hold_up(&self, duration: Duration) {
+        let signal = |name: &str| {
+            let id = self.process.0.id().to_string();
+            assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
+        };
+        signal("-STOP");
+        sleep(duration);
+        signal("-CONT");
     }
 
     /// Switches them off; what they noticed meanwhile.

@@ -43,6 +43,9 @@ const WATCHDOG_UNIT: Duration = Duration::from_millis(20);
 const WATCHDOG_UNITS: u8 = 25;
 /// After this silence moving servos stop by themselves.
 const WATCHDOG: Duration = Duration::from_millis(500);
+/// How long answers are waited for while nothing moves. While axes move it is [`WATCHDOG`]: the
+/// host bears with servos as long as they bear with it.
+const PATIENCE_AT_REST: Duration = Duration::from_secs(2);
 
 const _: () = assert!(WATCHDOG.as_millis() == WATCHDOG_UNIT.as_millis() * WATCHDOG_UNITS as u128);
 
@@ -103,11 +106,11 @@ impl Dynamixel {
         self.servos.get(..self.servos.len() - shutter).unwrap_or_default()
     }
 
-    /// Asks all servos for their state.
-    fn look(&mut self) {
+    /// Asks all servos for their state; whoever says nothing for so long is silent.
+    fn look(&mut self, patience: Duration) {
         let ids: Vec<ServoId> = self.servos.iter().map(Servo::id).collect();
         let is_fast = self.servos.iter().all(Servo::is_fast);
-        self.bus.read_all(&ids, STATE.address, STATE.length, is_fast);
+        self.bus.read_all(&ids, (STATE.address, STATE.length), is_fast, patience);
     }
 
     /// Takes the servos' states; the words for those who did not answer.

@@ -9,7 +9,7 @@ use super::bus::Heard;
 use super::packet::{Instruction, ServoId};
 use super::servo::Servo;
 use super::table::{BUS_WATCHDOG, GOAL_POSITION, PROFILE_ACCELERATION, TORQUE_ENABLE};
-use super::{Doing, Dynamixel, WATCHDOG, WATCHDOG_UNITS, stalled};
+use super::{Doing, Dynamixel, PATIENCE_AT_REST, WATCHDOG, WATCHDOG_UNITS, stalled};
 use crate::device::axes::{AxesCommand, AxesEvent};
 use crate::device::driver::Trouble;
 
@@ -86,7 +86,7 @@ impl Dynamixel {
             },
         };
         self.doing = Doing::Work(Work { command, stage: Stage::Looking });
-        self.look();
+        self.look(PATIENCE_AT_REST);
     }
 
     /// Goals for the axes alone.
@@ -120,7 +120,7 @@ impl Dynamixel {
         let is_asking = matches!(stage, Stage::Braking(..)) && self.wake.take().is_none();
         self.doing = Doing::Work(Work { command: Command::Stop, stage });
         if !is_asking {
-            self.look();
+            self.look(WATCHDOG);
         }
     }
 
@@ -170,7 +170,7 @@ impl Dynamixel {
 
     /// The time has come to look again, or to wait no longer.
     pub(super) fn wake_up(&mut self, _now: Instant) {
-        self.look();
+        self.look(WATCHDOG);
     }
 
     /// An answer came to what the command's stage asked.
@@ -178,7 +178,7 @@ impl Dynamixel {
         let Work { command, stage } = work;
         match stage {
             Stage::Engaging(waiting) => return self.engaged(now, command, waiting, &heard),
-            Stage::Restarting(waiting) => return self.restarted(now, waiting, &heard),
+            Stage::Restarting(waiting) => return self.restarted(now, waiting),
             Stage::Waking(looks) => return self.woken(now, command, looks, heard),
             _ => {}
         }
@@ -241,7 +241,7 @@ impl Dynamixel {
     fn engage(&mut self, now: Instant, command: Command, limp: VecDeque<ServoId>) {
         let Some(id) = limp.front().copied() else { return self.set_out(now, command) };
         let instruction = Instruction::Write { id, address: TORQUE_ENABLE.address, data: vec![1] };
-        self.bus.ask(id, &instruction, 0);
+        self.bus.ask(id, &instruction, 0, PATIENCE_AT_REST);
         self.doing = Doing::Work(Work { command, stage: Stage::Engaging(limp) });
     }
 
@@ -412,7 +412,7 @@ impl Dynamixel {
 
     fn tell_restart(&mut self, now: Instant, waiting: VecDeque<ServoId>) {
         let stage = if let Some(id) = waiting.front().copied() {
-            self.bus.ask(id, &Instruction::Reboot(id), 0);
+            self.bus.ask_once(id, &Instruction::Reboot(id), REBOOT);
             Stage::Restarting(waiting)
         } else {
             self.wake = Some(now + REBOOT);
@@ -421,11 +421,9 @@ impl Dynamixel {
         self.doing = Doing::Work(Work { command: Command::Clear, stage });
     }
 
-    fn restarted(&mut self, now: Instant, mut waiting: VecDeque<ServoId>, heard: &Heard) {
-        if heard.answers.is_empty() {
-            let silence = self.silence(&heard.missing);
-            return self.end(AxesEvent::Trouble(Trouble::Silent(silence)));
-        }
+    /// Whether its answer was lost or the words, a look tells: they are not said twice, because a
+    /// servo that is starting would start again.
+    fn restarted(&mut self, now: Instant, mut waiting: VecDeque<ServoId>) {
         waiting.pop_front();
         self.tell_restart(now, waiting);
     }

@@ -9,10 +9,12 @@ use super::bus::Heard;
 use super::packet::{Instruction, Status};
 use super::servo::{Servo, Wrong};
 use super::table::{Block, LIMITS, MODES, STATE, Span};
-use super::{Doing, Dynamixel};
+use super::{Doing, Dynamixel, WATCHDOG};
 use crate::device::axes::{AxesEvent, AxesFacts};
 use crate::device::driver::{Refusal, Trouble};
 
+/// How long each is waited for in a round: some may not be there.
+const PING: Duration = Duration::from_millis(120);
 /// Between two rounds of pings.
 const PING_AGAIN: Duration = Duration::from_millis(100);
 /// After so many rounds it is said what is missing, where anything is heard at all.
@@ -58,7 +60,7 @@ impl Dynamixel {
         if let Some((n, servo)) = waiting.find(|(_, servo)| servo.identity.is_none()) {
             let id = servo.id();
             self.doing = Doing::Survey(Survey::Ping(n, round));
-            self.bus.ask(id, &Instruction::Ping(id), 3);
+            self.bus.ask(id, &Instruction::Ping(id), 3, PING);
             return;
         }
         if self.servos.iter().all(|servo| servo.identity.is_some()) {
@@ -100,7 +102,8 @@ impl Dynamixel {
         let Some(servo) = self.servos.get(n) else { return self.ready() };
         let (id, Span { address, length }) = (servo.id(), asked.span());
         self.doing = Doing::Survey(Survey::Read(n, asked));
-        self.bus.ask(id, &Instruction::Read { id, address, length }, usize::from(length));
+        let read = Instruction::Read { id, address, length };
+        self.bus.ask(id, &read, usize::from(length), WATCHDOG);
     }
 
     pub(super) fn surveyed(&mut self, now: Instant, survey: Survey, heard: Heard) {

@@ -404,7 +404,8 @@ fn a_cut_cable_is_silence_and_the_rest_comes_to_rest() {
     };
     let AxesEvent::Trouble(Trouble::Silent(words)) = event else { panic!("{event:?}") };
     assert!(words.contains("servo 1 (theta), servo 2 (phi)"), "{words}");
-    assert!(pair.now - cut < Duration::from_millis(500), "{:?}", pair.now - cut);
+    // As long as they bear with the host; it asked each of them once more.
+    assert!(pair.now - cut < Duration::from_millis(600), "{:?}", pair.now - cut);
     // And by themselves the axes stand within the watchdog and the way in which they brake.
     let stood = cut + WATCHDOG + Duration::from_millis(460);
     pair.bench.advance(stood);
