@@ -471,7 +471,6 @@ impl Estimate {
     }
 }
 
-/// The budget's name for what the basis can't follow.
 /// The name of what the functions can't follow among contributions.
 pub const TRUNCATION: &str = "truncation";
 /// The budget's name for what is independent from reading to reading.

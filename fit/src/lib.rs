@@ -99,6 +99,7 @@ mod sample;
 mod shift;
 mod solve;
 mod sparse;
+mod spectral;
 mod symmetry;
 pub mod trials;
 pub mod triangle;

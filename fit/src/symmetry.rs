@@ -11,6 +11,7 @@
 
 use crate::basis::Basis;
 use crate::parts::CommonShift;
+use crate::spectral::Singular;
 use crate::{Angular, Chart, Fit, FitError, Parts, Quality, Ray, Region, Truncation, sparse};
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
@@ -300,10 +301,10 @@ fn forbidden(basis: &Basis, symmetry: Symmetry) -> Result<Mat<f64>, SymmetryErro
             }
         });
     }
-    let svd = changes.thin_svd().map_err(|_| SymmetryError::Fit(FitError::OutOfRange))?;
-    let values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let Singular { values, right } =
+        Singular::of(&changes).ok_or(SymmetryError::Fit(FitError::OutOfRange))?;
     let rank = values.iter().filter(|value| **value > RANK).count();
-    Ok(svd.V().get(.., ..rank).to_owned())
+    Ok(right.get(.., ..rank).to_owned())
 }
 
 /// Rays spread evenly (Roberts' sequence) over the directions and a disk within the region. Harmonics

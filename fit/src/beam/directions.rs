@@ -8,7 +8,8 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use faer::{Mat, Side};
+use crate::spectral::Eigen;
+use faer::Mat;
 use radiometry::beam::Beam;
 use radiometry::quadrature::gauss_legendre;
 
@@ -180,15 +181,15 @@ fn gauss(fine: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
         }
         last = std::mem::replace(&mut this, next.into_iter().map(|value| value / length).collect());
     }
-    match matrix.self_adjoint_eigen(Side::Lower) {
-        Ok(eigen) => (0..count)
+    match Eigen::of(&matrix) {
+        Some(Eigen { values, vectors }) => (0..count)
             .map(|k| {
-                let square = eigen.S().column_vector()[k].max(0.0) * largest;
-                (square.sqrt(), eigen.U()[(0, k)].powi(2))
+                let square = values[k].max(0.0) * largest;
+                (square.sqrt(), vectors[(0, k)].powi(2))
             })
             .collect(),
         // It always converges; if not, the fine slopes are as right.
-        Err(_) => fine.to_vec(),
+        None => fine.to_vec(),
     }
 }
 

@@ -9,8 +9,9 @@
 
 use crate::FitError;
 use crate::penalty::Roughness;
+use crate::spectral::Eigen;
 use crate::triangle::Solution;
-use faer::{Mat, Side};
+use faer::Mat;
 
 /// A strength and how likely the data are under it.
 #[derive(Debug, Clone, Copy)]
@@ -47,8 +48,7 @@ impl Evidence {
         reflect_first(&mut standard, &mut z);
         let held = standard.as_ref().submatrix(1, 1, p - 1, p - 1);
         let gram = held * held.transpose();
-        let eigen = gram.self_adjoint_eigen(Side::Lower).map_err(|_| FitError::OutOfRange)?;
-        let (vectors, values) = (eigen.U(), eigen.S().column_vector());
+        let Eigen { values, vectors } = Eigen::of(&gram).ok_or(FitError::OutOfRange)?;
         let components = (0..p - 1)
             .map(|i| (0..p - 1).map(|k| vectors[(k, i)] * z[k + 1]).sum::<f64>())
             .collect();

@@ -1,9 +1,8 @@
 //! What the rows of a closed triangle determine, how well, and what they leave open.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::svd;
+use crate::spectral::Singular;
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Mat, MatRef, Par, Spec};
+use faer::{Mat, MatRef, Par};
 
 /// What a closed [`Triangle`](super::Triangle) determines.
 #[derive(Debug, Clone)]
@@ -84,13 +83,12 @@ impl Spectrum {
         let lengths: Vec<f64> = r.col_iter().map(|column| column.norm_l2()).collect();
         let divisor = |length: f64| if length > 0.0 { length } else { 1.0 };
         let scaled = Mat::from_fn(p, p, |i, j| r[(i, j)] / divisor(lengths[j]));
-        let values = singular_values(&scaled, None)?;
+        let values = Singular::values(&scaled)?;
         let mut spectrum = Self { values, undetermined_shares: vec![0.0; p] };
         let rank = spectrum.rank();
         // The directions cost another p² of memory, and are of interest only where some are open.
         if rank < p {
-            let mut right = Mat::zeros(p, p);
-            singular_values(&scaled, Some(&mut right))?;
+            let Singular { right, .. } = Singular::of(&scaled)?;
             let share = |k: usize| (rank..p).map(|i| right[(k, i)].powi(2)).sum();
             spectrum.undetermined_shares = (0..p).map(share).collect();
         }
@@ -115,35 +113,6 @@ impl Spectrum {
     pub fn undetermined_shares(&self) -> &[f64] {
         &self.undetermined_shares
     }
-}
-
-/// The singular values of a square matrix, the largest first, and its right singular vectors if
-/// there is room for them. `None` if the decomposition doesn't converge.
-fn singular_values(matrix: &Mat<f64>, right: Option<&mut Mat<f64>>) -> Option<Vec<f64>> {
-    let p = matrix.ncols();
-    let vectors = |wanted| {
-        if wanted { svd::ComputeSvdVectors::Full } else { svd::ComputeSvdVectors::No }
-    };
-    let scratch = svd::svd_scratch::<f64>(
-        p,
-        p,
-        vectors(false),
-        vectors(right.is_some()),
-        Par::Seq,
-        Spec::default(),
-    );
-    let mut values = faer::diag::Diag::<f64>::zeros(p);
-    svd::svd(
-        matrix.as_ref(),
-        values.as_mut(),
-        None,
-        right.map(Mat::as_mut),
-        Par::Seq,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Spec::default(),
-    )
-    .ok()?;
-    Some(values.column_vector().iter().copied().collect())
 }
 
 /// A combination is determined when its singular value is above this share of the largest one.

@@ -1,9 +1,10 @@
 //! How strongly the readings themselves ask for finer functions to be held: by the marginal likelihood,
 //! as in [`crate::choose`]. It knows a joint triangle, and no functions.
 
+use crate::spectral::Eigen;
 use crate::triangle::Solution;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par, Side};
+use faer::{Mat, Par};
 use std::ops::RangeInclusive;
 
 /// What is held against one finer function more than against another.
@@ -59,7 +60,7 @@ pub(super) struct Shares {
 
 impl Shares {
     /// Of a joint triangle whose first p unknowns are the fit's own. `None` where the combinations
-    /// can't be told apart: the iteration for them rarely comes to no end.
+    /// can't be told apart: the iteration for them doesn't converge.
     pub(super) fn of(solution: &Solution, p: usize, root: &Mat<f64>) -> Option<Self> {
         let q = root.nrows();
         let z = solution.rotated(0).split_off(p);
@@ -67,8 +68,7 @@ impl Shares {
         let mut turned = solution.r().submatrix(p, p, q, q).transpose().to_owned();
         solve_lower_triangular_in_place(root.transpose(), turned.as_mut(), Par::Seq);
         let gram = turned.transpose() * &turned;
-        let eigen = gram.self_adjoint_eigen(Side::Lower).ok()?;
-        let (vectors, values) = (eigen.U(), eigen.S().column_vector());
+        let Eigen { values, vectors } = Eigen::of(&gram)?;
         let component = |i: usize| (0..q).map(|k| vectors[(k, i)] * z[k]).sum::<f64>();
         Some(Self {
             determined: (0..q).map(|i| values[i].max(0.0)).collect(),
