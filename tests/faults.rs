@@ -180,6 +180,9 @@ fn what_saturates_the_meter_is_flagged_and_never_a_number() {
     let bench = arm().with("plan.toml", "gain = \"2 uA\"", "gain = \"2 nA\"");
     let said = bench.gonio(&["run", "plan.toml", "--out", "run"]);
     assert!(said.out.contains("13 saturated"), "{said}");
+    // No fit makes a value with an uncertainty of them.
+    assert!(said.out.contains("all 13 readings are lower limits"), "{said}");
+    assert_eq!(said.code, Some(1), "{said}");
     let samples = radiances(&bench, "run");
     assert!(samples.len() > 10 && samples.iter().all(|(_, flags)| flags.contains("saturated")));
     let readings = bench.text("run/readings.csv");

@@ -129,6 +129,12 @@ pub enum FitError {
         /// Samples handed in, and coefficients.
         readings: usize,
     },
+    /// All samples are lower limits: the field may be anything above them. Measure with a less
+    /// sensitive range, or a shorter integration.
+    OnlyLimits {
+        /// Samples handed in.
+        readings: usize,
+    },
     /// The samples leave combinations of coefficients open.
     Undetermined {
         /// How many combinations are determined.
@@ -240,6 +246,7 @@ impl fmt::Display for FitError {
                 "{readings} readings of unknown noise for as many coefficients: no residual tells \
                  the noise"
             ),
+            Self::OnlyLimits { readings } => only_limits(f, *readings),
             Self::Undetermined { rank, coefficients, causes, functions } => {
                 undetermined(f, *rank, *coefficients, causes, functions)
             }
@@ -259,6 +266,14 @@ impl fmt::Display for FitError {
             }
         }
     }
+}
+
+fn only_limits(f: &mut fmt::Formatter<'_>, readings: usize) -> fmt::Result {
+    write!(
+        f,
+        "all {readings} readings are lower limits (saturated), which say no more than that the field is \
+         at least so large; expected readings within the range: measure with a less sensitive one"
+    )
 }
 
 fn planes_too_near(f: &mut fmt::Formatter<'_>, distance_mm: f64) -> fmt::Result {

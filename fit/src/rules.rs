@@ -2,6 +2,7 @@
 //! darkness kept from being darker. The one way that runs and files go.
 
 use crate::choice::{Choice, Wish, choose};
+use crate::solve::check_readings;
 use crate::{
     Fit, FitError, Nonnegative, Optics, Penalised, Readings, Region, Robust, Sample, Symmetry,
     SymmetryError, SymmetryTest,
@@ -47,13 +48,9 @@ pub fn fit_wished(
     wish: &Wish,
     optics: Option<&Optics>,
 ) -> Result<Ruled, FitError> {
+    check_readings(readings)?;
     let said: Vec<Sample> = kept(readings, |i| readings.limits.binary_search(&i).is_err());
-    // Nothing but limits is refused for what it is by the fit.
-    let (model, choice) = if said.is_empty() {
-        choose(readings.samples, region, wish, optics)?
-    } else {
-        choose(&said, region, wish, optics)?
-    };
+    let (model, choice) = choose(&said, region, wish, optics)?;
     let rules = &wish.rules;
     let readings = &Readings { robust: rules.robust, ..*readings };
     let (mut fit, mut choice) = (crate::fit_readings(readings, region, model, optics)?, choice);

@@ -154,6 +154,9 @@ pub(crate) fn check_readings(readings: &Readings<'_>) -> Result<(), FitError> {
             let found = limits.iter().filter(|limit| **limit < samples.len()).count();
             Err(FitError::Parts { what: "limits", expected: limits.len(), found })
         }
+        Some(_) if limits.len() == samples.len() => {
+            Err(FitError::OnlyLimits { readings: samples.len() })
+        }
         _ => Ok(()),
     }
 }

@@ -275,3 +275,18 @@ fn a_component_that_readings_say_nothing_of_is_carried_whether_fitted_or_not() {
     let found = &fitted.weighed().unwrap().nuisances[0];
     assert!(found.value.abs() < 1e-6 && (found.u - 1.0).abs() < 1e-6, "{found:?}");
 }
+
+#[test]
+fn limits_alone_are_refused_by_every_way_to_a_field() {
+    let samples = readings(0);
+    let limits: Vec<usize> = (0..samples.len()).collect();
+    let given = Readings { limits: &limits, ..Readings::of(&samples) };
+    let expected = fit::FitError::OnlyLimits { readings: samples.len() };
+    assert_eq!(fit_readings(&given, &REGION, BASIS, None).unwrap_err(), expected);
+    let open = fit::fit_wished(&given, &REGION, &fit::Wish::default(), None);
+    assert_eq!(open.unwrap_err(), expected);
+    // One that is none, and a field of one coefficient stands on it.
+    let flat = BasisSpec::zernike(0, 0);
+    let given = Readings { limits: &limits[1..], ..Readings::of(&samples) };
+    assert!(fit_readings(&given, &REGION, flat, None).is_ok());
+}
