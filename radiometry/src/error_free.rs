@@ -6,7 +6,13 @@
 //! no thought about conditioning. The fused multiply-add is correctly rounded with or without
 //! hardware for it, so it costs speed at most, never bits.
 
+#![expect(
+    clippy::inline_always,
+    reason = "code for a kind of processor is what was inlined into it"
+)]
+
 /// a + b as (rounded sum, exact rest). Knuth, any order of magnitudes.
+#[inline(always)]
 pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_rounded = sum - a;
@@ -14,6 +20,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// a · b as (rounded product, exact rest), barring underflow of the rest.
+#[inline(always)]
 pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))
@@ -37,13 +44,14 @@ pub(crate) fn scaled(value: f64, exponent: i32) -> f64 {
 }
 
 /// An unevaluated sum of two doubles, about 32 digits.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
 impl DoubleDouble {
+    #[inline(always)]
     pub(crate) const fn from_f64(value: f64) -> Self {
         Self { high: value, low: 0.0 }
     }
@@ -59,10 +67,12 @@ impl DoubleDouble {
     }
 
     /// Rounded to the nearest double.
+    #[inline(always)]
     pub(crate) fn to_f64(self) -> f64 {
         self.high + self.low
     }
 
+    #[inline(always)]
     pub(crate) fn add(self, other: Self) -> Self {
         let (high, rest) = two_sum(self.high, other.high);
         let (low, low_rest) = two_sum(self.low, other.low);
@@ -70,15 +80,30 @@ impl DoubleDouble {
         Self::renormalised(high, rest + low_rest)
     }
 
+    #[inline(always)]
     pub(crate) fn sub(self, other: Self) -> Self {
         self.add(other.neg())
     }
 
+    #[inline(always)]
     pub(crate) fn mul(self, other: Self) -> Self {
         let (high, rest) = two_product(self.high, other.high);
         Self::renormalised(high, rest + self.high.mul_add(other.low, self.low * other.high))
     }
 
+    /// By a double.
+    #[inline(always)]
+    pub(crate) fn times(self, factor: f64) -> Self {
+        let (high, rest) = two_product(self.high, factor);
+        Self::renormalised(high, self.low.mul_add(factor, rest))
+    }
+
+    /// a / b of two doubles.
+    pub(crate) fn ratio(a: f64, b: f64) -> Self {
+        Self::from_f64(a).div(Self::from_f64(b))
+    }
+
+    #[inline(always)]
     pub(crate) fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
@@ -115,9 +140,34 @@ impl DoubleDouble {
         Self { high: 0.5 * self.high, low: 0.5 * self.low }
     }
 
+    #[inline(always)]
     fn renormalised(high: f64, low: f64) -> Self {
         let (high, low) = two_sum(high, low);
         Self { high, low }
+    }
+}
+
+/// Several double-doubles side by side, their parts apart, as instructions on vectors take them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Abreast<const N: usize> {
+    high: [f64; N],
+    low: [f64; N],
+}
+
+impl<const N: usize> Abreast<N> {
+    #[inline(always)]
+    pub(crate) fn of(numbers: [DoubleDouble; N]) -> Self {
+        Self { high: numbers.map(|number| number.high), low: numbers.map(|number| number.low) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&self, i: usize) -> DoubleDouble {
+        DoubleDouble { high: self.high[i], low: self.low[i] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set(&mut self, i: usize, number: DoubleDouble) {
+        (self.high[i], self.low[i]) = (number.high, number.low);
     }
 }
 

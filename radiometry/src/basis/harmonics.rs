@@ -7,12 +7,17 @@
 //! poles doubles would lose k² roundings. The norm is a product with an exponent of its own
 //! (Fukushima 2012), since (l+m)! leaves the range at l = 86.
 
+#![expect(
+    clippy::inline_always,
+    reason = "code for a kind of processor is what was inlined into it"
+)]
+
 use core::f64::consts::PI;
 
 use glam::DVec3;
 
 use crate::domain::{DomainError, within};
-use crate::error_free::{DoubleDouble, cosine};
+use crate::error_free::{Abreast, DoubleDouble, cosine};
 
 /// Degrees beyond this are refused: a double has no digit left of what the recurrence would need.
 const DEGREE_MAX: usize = 10_000;
@@ -53,22 +58,16 @@ pub fn amplitude(l: usize, m: usize, theta_rad: f64) -> Result<f64, DomainError>
 #[derive(Debug, Clone, PartialEq)]
 pub struct SphericalHarmonics {
     degree: usize,
-    /// √((2l+1)/(4π)) Π √((l+i)(l-i+1))/(2i), by l(l+1)/2 + m.
-    norms: Vec<f64>,
+    /// From m = 0 upwards.
+    orders: Vec<Orders>,
 }
 
 impl SphericalHarmonics {
     /// All of them up to a degree in 0 to 200.
     pub fn new(degree: usize) -> Result<Self, DomainError> {
         within("degree", degree as f64, 0.0, 200.0)?;
-        let orders = (0..=degree).flat_map(|l| (0..=l).map(move |m| (l, m)));
-        let norms = orders
-            .map(|(l, m)| {
-                let (scale, exponent) = norm(l, m, 1.0);
-                libm::scalbn(scale, exponent)
-            })
-            .collect();
-        Ok(Self { degree, norms })
+        let orders = (0..=degree).step_by(LANES).map(|first| Orders::new(first, degree));
+        Ok(Self { degree, orders: orders.collect() })
     }
 
     /// The highest degree.
@@ -96,26 +95,117 @@ impl SphericalHarmonics {
     /// ```
     pub fn evaluate(&self, direction: DVec3, values: &mut [f64]) {
         assert_eq!(values.len(), self.len(), "one value a harmonic");
-        let z = DoubleDouble::from_f64(direction.z);
+        // The widest instructions that this processor has: the same bits, up to thirty times sooner.
+        pulp::Arch::new().dispatch(Evaluation { harmonics: self, direction, values });
+    }
+}
+
+/// All values in one direction, in code that is compiled for each kind of processor.
+struct Evaluation<'a> {
+    harmonics: &'a SphericalHarmonics,
+    direction: DVec3,
+    values: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Evaluation<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { harmonics, direction, values } = self;
         // (x + iy)^m = sinᵐ θ (cos mφ + i sin mφ): no angle needed, exact zeros at the pole.
         let (mut re, mut im) = (1.0, 0.0);
-        for m in 0..=self.degree {
-            let mut gegenbauer = Gegenbauer::new(m, z);
-            for l in m..=self.degree {
-                let amplitude = self.norms[l * (l + 1) / 2 + m] * gegenbauer.value.to_f64();
-                let middle = l * (l + 1);
-                if m == 0 {
-                    values[middle] = amplitude;
-                } else {
-                    let amplitude = core::f64::consts::SQRT_2 * amplitude;
-                    values[middle + m] = amplitude * re;
-                    values[middle - m] = amplitude * im;
-                }
-                gegenbauer.advance();
+        for orders in &harmonics.orders {
+            let (mut cos, mut sin) = ([0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                (cos[i], sin[i]) = (re, im);
+                (re, im) =
+                    (re * direction.x - im * direction.y, re * direction.y + im * direction.x);
             }
-            (re, im) = (re * direction.x - im * direction.y, re * direction.y + im * direction.x);
+            orders.evaluate(direction.z, &cos, &sin, values);
         }
     }
+}
+
+/// As many orders m as one instruction takes side by side: from one degree above m to the next all
+/// take the same steps.
+const LANES: usize = 8;
+
+/// Neighbouring orders: how each one's recurrence goes on, and its norms.
+#[derive(Debug, Clone, PartialEq)]
+struct Orders {
+    /// The lowest m.
+    first: usize,
+    /// By k = l - m.
+    steps: Vec<Step>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Step {
+    /// √2 (1 of m = 0) √((2l+1)/(4π)) Π √((l+i)(l-i+1))/(2i); 0 beyond the highest degree.
+    norm: [f64; LANES],
+    /// k/(k + 2λ), to twice a double's digits.
+    ratio: Abreast<LANES>,
+}
+
+impl Orders {
+    fn new(first: usize, degree: usize) -> Self {
+        let step = |k: usize| {
+            let norm_of = |m: usize| {
+                let l = k + m;
+                if l > degree {
+                    return 0.0;
+                }
+                let (scale, exponent) = norm(l, m, 1.0);
+                let azimuth = if m > 0 { core::f64::consts::SQRT_2 } else { 1.0 };
+                azimuth * libm::scalbn(scale, exponent)
+            };
+            let ratio_of = |m: usize| DoubleDouble::ratio(k as f64, (k + 2 * m + 1) as f64);
+            let orders: [usize; LANES] = core::array::from_fn(|i| first + i);
+            Step { norm: orders.map(norm_of), ratio: Abreast::of(orders.map(ratio_of)) }
+        };
+        Self { first, steps: (0..=degree - first).map(step).collect() }
+    }
+
+    /// The values of these orders, whose azimuths are given.
+    #[inline(always)]
+    fn evaluate(&self, z: f64, cos: &[f64; LANES], sin: &[f64; LANES], values: &mut [f64]) {
+        let mut value = Abreast::of([DoubleDouble::from_f64(1.0); LANES]);
+        let mut before = Abreast::of([DoubleDouble::from_f64(0.0); LANES]);
+        let degree = self.first + self.steps.len() - 1;
+        for (k, step) in self.steps.iter().enumerate() {
+            let (mut even, mut odd) = ([0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                let amplitude = step.norm[i] * value.get(i).to_f64();
+                (even[i], odd[i]) = (amplitude * cos[i], amplitude * sin[i]);
+            }
+            for i in 0..LANES.min(degree + 1 - self.first - k) {
+                let (m, l) = (self.first + i, self.first + i + k);
+                if m > 0 {
+                    values[l * (l + 1) - m] = odd[i];
+                }
+                values[l * (l + 1) + m] = even[i];
+            }
+            for i in 0..LANES {
+                let last = value.get(i);
+                value.set(i, advanced(last, before.get(i), z, step.ratio.get(i)));
+                before.set(i, last);
+            }
+        }
+    }
+}
+
+/// c₍ₖ₊₁₎ of cₖ and c₍ₖ₋₁₎, scaled to 1 at x = 1: x cₖ + (x cₖ - c₍ₖ₋₁₎) k/(k + 2λ), the recurrence
+/// without a division.
+#[inline(always)]
+fn advanced(
+    value: DoubleDouble,
+    before: DoubleDouble,
+    x: f64,
+    ratio: DoubleDouble,
+) -> DoubleDouble {
+    let ahead = value.times(x);
+    ahead.add(ahead.sub(before).mul(ratio))
 }
 
 /// All real hemispherical harmonics up to a degree, orthonormal over the hemisphere under the

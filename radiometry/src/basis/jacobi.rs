@@ -6,6 +6,11 @@
 //! A Δₖ = D Δₖ₋₁ - B (1-x) Pₖ, with s = 2k+β, A = 2(k+1)(k+β+1)s, B = s(s+1)(s+2),
 //! D = 2k(k+β)(s+2); for k = 0 the common factor s goes.
 
+#![expect(
+    clippy::inline_always,
+    reason = "code for a kind of processor is what was inlined into it"
+)]
+
 /// One step of the recurrence: `Δₖ = carry · Δₖ₋₁ - pull · (1-x) · Pₖ`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step {
@@ -49,6 +54,7 @@ impl Recurrence {
     }
 
     /// On to Pₖ₊₁.
+    #[inline(always)]
     pub(super) fn advance(&mut self, step: Step) {
         let pull = step.pull * self.one_minus_x * self.value;
         self.difference = step.carry.mul_add(self.difference, -pull);

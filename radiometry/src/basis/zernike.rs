@@ -5,6 +5,11 @@
 //! with coefficients c is c₀ √π and its mean square is Σ c². In x = sin θ cos φ, y = sin θ sin φ
 //! they are polynomials: smooth over the pole. What is fitted with them is not known here.
 
+#![expect(
+    clippy::inline_always,
+    reason = "code for a kind of processor is what was inlined into it"
+)]
+
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
@@ -70,27 +75,8 @@ impl Zernike {
     /// As [`evaluate`](Self::evaluate), at a unit vector.
     pub fn evaluate_direction(&self, direction: DVec3, values: &mut [f64]) {
         assert_eq!(values.len(), self.len(), "one value a polynomial");
-        let one_minus_x = 2.0 * direction.z * direction.z;
-        // (x + iy)^m = r^m (cos mφ + i sin mφ): exact zeros at the pole, no angle needed.
-        let (mut re, mut im) = (1.0, 0.0);
-        for (m, family) in self.families.iter().enumerate() {
-            // Those of m = 0 are Legendre polynomials, even or odd in x: near the pole, where x is -1,
-            // they are as exact as at the rim. For m > 0 the power of r takes care of that.
-            let is_mirrored = m == 0 && one_minus_x > 1.0;
-            let one_minus_x =
-                if is_mirrored { 2.0 * direction.truncate().length_squared() } else { one_minus_x };
-            let mut radial = Recurrence::new(one_minus_x);
-            let mut sign = 1.0;
-            for member in family {
-                let amplitude = sign * member.norm * radial.value();
-                sign = if is_mirrored { -sign } else { sign };
-                // For m = 0 both are one place, and the cosine is written last.
-                values[member.sin_index] = amplitude * im;
-                values[member.cos_index] = amplitude * re;
-                radial.advance(member.step);
-            }
-            (re, im) = (re * direction.x - im * direction.y, re * direction.y + im * direction.x);
-        }
+        // With fused multiply-adds where the processor has them: the same bits, sooner.
+        pulp::Arch::new().dispatch(Evaluation { zernike: self, direction, values });
     }
 
     /// The integral of each polynomial over the cone θ <= `theta_max`, under the projected solid
@@ -126,6 +112,43 @@ impl Zernike {
             values[member.cos_index] = member.norm * over_disk;
         }
         Ok(())
+    }
+}
+
+/// All values in one direction, in code that is compiled for each kind of processor.
+struct Evaluation<'a> {
+    zernike: &'a Zernike,
+    direction: DVec3,
+    values: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Evaluation<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { zernike, direction, values } = self;
+        let one_minus_x = 2.0 * direction.z * direction.z;
+        // (x + iy)^m = r^m (cos mφ + i sin mφ): exact zeros at the pole, no angle needed.
+        let (mut re, mut im) = (1.0, 0.0);
+        for (m, family) in zernike.families.iter().enumerate() {
+            // Those of m = 0 are Legendre polynomials, even or odd in x: near the pole, where x is -1,
+            // they are as exact as at the rim. For m > 0 the power of r takes care of that.
+            let is_mirrored = m == 0 && one_minus_x > 1.0;
+            let one_minus_x =
+                if is_mirrored { 2.0 * direction.truncate().length_squared() } else { one_minus_x };
+            let mut radial = Recurrence::new(one_minus_x);
+            let mut sign = 1.0;
+            for member in family {
+                let amplitude = sign * member.norm * radial.value();
+                sign = if is_mirrored { -sign } else { sign };
+                // For m = 0 both are one place, and the cosine is written last.
+                values[member.sin_index] = amplitude * im;
+                values[member.cos_index] = amplitude * re;
+                radial.advance(member.step);
+            }
+            (re, im) = (re * direction.x - im * direction.y, re * direction.y + im * direction.x);
+        }
     }
 }
 
