@@ -166,6 +166,38 @@ fn sweeps_are_slower_where_light_is_scarce_and_no_slower_where_it_is_not() {
     assert!(truly(&summary) < 0.05, "{said}");
 }
 
+#[test]
+fn the_dark_level_is_read_again_where_it_is_all_that_the_exitance_lacks() {
+    let wanted = "radiance_relative = 0.05\nexitance_within_region_relative = 0.006";
+    let bench = bench()
+        .with("plan.toml", "radiance_relative = 0.02", wanted)
+        .with("plan.toml", "dwell_ms = 200", "dwell_ms = 25")
+        .with("scene.toml", "sr = 100", "sr = 0.05");
+    let (said, summary) = run(&bench);
+    assert_eq!(said.code, Some(0), "{said}");
+    let rounds = rounds(&summary);
+    let of = |round: &Value, key: &str| number(&round[key]);
+    let last = rounds.last().unwrap();
+    let u = "exitance_within_region_u_relative";
+    let before = rounds.iter().find(|round| round["sweeps"] == last["sweeps"]).unwrap();
+    assert!(of(before, u) > 0.006 && of(last, u) <= 0.006, "{said}");
+    assert!(of(last, "dark_relative") < 0.6 * of(before, "dark_relative"), "{said}");
+    // No sweep more, and no more time than the reading.
+    let steps = Reader::open(&bench.path("out/run.sqlite")).unwrap().steps().unwrap();
+    let dark = steps.last().unwrap();
+    assert!(dark.pose.is_none() && dark.dwell.as_secs_f64() > 0.05, "{dark:?}");
+    let longer = of(last, "rig_s") - of(before, "rig_s");
+    assert!((longer - dark.dwell.as_secs_f64()).abs() < 0.1, "{longer} {dark:?}");
+    assert_eq!(summary["targets_measured"], summary["targets_planned"]);
+    // Cut off before that was decided, and carried on, it decides so again.
+    let decided = u32::try_from(rounds.len()).unwrap();
+    cut_off(&bench, steps.len() - 2, decided - 2);
+    bench.gonio(&["resume", "out", "--accept-drift"]).well();
+    let again = Reader::open(&bench.path("out/run.sqlite")).unwrap().steps().unwrap();
+    let last = again.last().unwrap();
+    assert!(again.len() >= steps.len() && last.pose.is_none(), "{last:?}");
+}
+
 /// With so little time that a round is broken off: what the plan foretells of its first one does not
 /// know how long warming up takes.
 fn short_of_time(bench: Bench, room_s: f64) -> Bench {

@@ -82,8 +82,8 @@ impl Deciding {
         let (mut account, choice) =
             decide(&self.terms, &self.steps, &self.readings, &self.accounts);
         let next = match choice {
-            Choice::Measure(wanted) => {
-                match plan.lay_out_round(rig, After::steps(rig, &self.steps), &wanted) {
+            Choice::Measure(further) => {
+                match plan.lay_out_round(rig, After::steps(rig, &self.steps), &further) {
                     Ok(round) => Next::Measure(round.steps),
                     Err(problem) => {
                         let why = format!("the rig can't fly what is wanted: {problem}");
@@ -164,6 +164,11 @@ fn found(account: &Account) -> String {
     }
     if let Some(u) = account.exitance_u_relative {
         text.extend(["; u of exitance ", &percent(u)]);
+    }
+    if let Some(u) = account.exitance_within_region_u_relative {
+        let dark = account.dark_relative.map_or_else(String::new, percent);
+        text.extend([" (within the region, without the scale, ", &percent(u), ")"]);
+        text.extend(["; dark level ", &dark]);
     }
     text
 }

@@ -112,7 +112,10 @@ fn decided_on_the_way(setup: &Setup) -> Option<Vec<String>> {
     let adaptive = setup.plan.adaptive()?;
     let radiance = adaptive.radiance_relative.map(|part| format!("radiance to {}", percent(part)));
     let exitance = adaptive.exitance_relative.map(|part| format!("exitance to {}", percent(part)));
-    let targets: Vec<String> = radiance.into_iter().chain(exitance).collect();
+    let within = adaptive
+        .exitance_within_region_relative
+        .map(|part| format!("exitance within the region to {} without the scale", percent(part)));
+    let targets: Vec<String> = radiance.into_iter().chain(exitance).chain(within).collect();
     let limit = setup.plan.stop.rig_time_max.map_or(0.0, |limit| limit.as_secs_f64());
     let arc_deg = adaptive.arc_rad(&setup.plan, &setup.rig).to_degrees();
     Some(row(
@@ -188,6 +191,7 @@ fn as_json(
         "adaptive": setup.plan.adaptive().map(|adaptive| json!({
             "radiance_relative": adaptive.radiance_relative,
             "exitance_relative": adaptive.exitance_relative,
+            "exitance_within_region_relative": adaptive.exitance_within_region_relative,
             "first_round_s": prediction.total_s(),
             "at_most_s": setup.plan.stop.rig_time_max.map(|limit| limit.as_secs_f64()),
         })),

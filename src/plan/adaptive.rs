@@ -46,11 +46,15 @@ pub struct Adaptive {
     pub radiance_relative: Option<f64>,
     /// Target: the exitance's combined relative standard uncertainty.
     pub exitance_relative: Option<f64>,
+    /// Target: that of the exitance into the region's directions, without the scale that all
+    /// readings share.
+    pub exitance_within_region_relative: Option<f64>,
 }
 
 impl Adaptive {
-    /// `x_count`, `y_count`; `narrowest_feature_deg` (default: `[expect]`'s); `radiance_relative` and `exitance_relative`, one of them
-    /// at least; `phi_step_deg`, if the first round shall be coarser or finer than that asks.
+    /// `x_count`, `y_count`; `narrowest_feature_deg` (default: `[expect]`'s); `radiance_relative`,
+    /// `exitance_relative` and `exitance_within_region_relative`, one of them at least;
+    /// `phi_step_deg`, if the first round shall be coarser or finer than the narrowest feature asks.
     pub(super) fn read(table: &Table<'_>, expect: &Expect) -> Result<Self, Problem> {
         let phi_step_deg = if table.has("phi_step_deg") {
             Some(read_turn_step(table, "phi_step_deg")?)
@@ -70,16 +74,23 @@ impl Adaptive {
             phi_step_deg,
             radiance_relative: table.number("radiance_relative", TARGET)?,
             exitance_relative: table.number("exitance_relative", TARGET)?,
+            exitance_within_region_relative: table
+                .number("exitance_within_region_relative", TARGET)?,
         };
-        if adaptive.radiance_relative.is_none() && adaptive.exitance_relative.is_none() {
+        if adaptive.radiance_relative.is_none() && !adaptive.asks_exitance() {
             return Err(table.problem(
                 "radiance_relative",
                 "nothing says when it is enough",
-                "radiance_relative, exitance_relative, or both",
+                "radiance_relative, exitance_relative, exitance_within_region_relative, or several",
                 "state the error that the run is to reach, for example radiance_relative = 0.02",
             ));
         }
         Ok(adaptive)
+    }
+
+    /// Whether a target is one of the exitance.
+    pub const fn asks_exitance(&self) -> bool {
+        self.exitance_relative.is_some() || self.exitance_within_region_relative.is_some()
     }
 
     /// Such a schedule has its targets itself, and needs an end that comes in any case.
@@ -145,9 +156,8 @@ impl Adaptive {
         let turn = if sweep::reaches_over(plan, rig) { PI } else { TAU };
         let places = grid::places(&plan.region, self.x_count, self.y_count);
         let count = self.meridians(plan, rig);
-        let stride = stride(places.len());
         let meridian = |k: u32| {
-            let (x_m, y_m) = places[(k as usize * stride) % places.len()];
+            let (x_m, y_m) = places[grid::dealt(k as usize, places.len())];
             let phi_rad = turn * f64::from(k) / f64::from(count);
             Meridian { x_m, y_m, phi_rad, theta_rad: range(plan, rig), window: plan.dwell }
         };
@@ -192,15 +202,4 @@ fn evenly(plan: &Plan, rig: &Rig, i: u32, start: f64) -> Meridian {
         theta_rad: range(plan, rig),
         window: plan.dwell,
     }
-}
-
-/// From place to place, so that neighbouring meridians stand far apart: about 0.38 of them, and no
-/// divisor of their count.
-fn stride(places: usize) -> usize {
-    let wanted = (places * 382).div_ceil(1000).max(1);
-    (wanted..=wanted + places).find(|stride| gcd(*stride, places) == 1).unwrap_or(1)
-}
-
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
 }

@@ -2,7 +2,9 @@
 //! sweeps, names used twice, sweeps that a rig can't fly, terms that contradict each other.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
+use firmware_protocol::Shutter;
 use spanned_toml::{Document, Problem, Source};
 
 use super::*;
@@ -74,7 +76,7 @@ fn rounds_follow_with_names_of_their_own_and_come_back_from_their_steps() {
         })
         .collect();
     let after = After::steps(&rig, &sequence.steps);
-    let round = plan.lay_out_round(&rig, after, &wanted).unwrap();
+    let round = plan.lay_out_round(&rig, after, &Further::Sweeps(wanted.clone())).unwrap();
     let steps = [sequence.steps.clone(), round.steps.clone()].concat();
     assert!(steps.iter().enumerate().all(|(i, step)| step.id as usize == i));
     let all = sequence.with_steps(&rig, steps.clone());
@@ -101,17 +103,21 @@ fn sweeps_go_from_one_to_the_nearest_and_play_is_respected() {
     let adaptive = *plan.adaptive().unwrap();
     let wanted: Vec<Meridian> = (0..24).map(|i| adaptive.candidate(&plan, &rig, i)).collect();
     let after = After { step: 7, target: 0, here: crate::rig::Latched::ZERO };
-    let seconds = |rig: &Rig| plan.lay_out_round(rig, after, &wanted).unwrap().seconds;
+    let all = Further::Sweeps(wanted.clone());
+    let seconds = |rig: &Rig| plan.lay_out_round(rig, after, &all).unwrap().seconds;
     let alone: f64 = wanted
         .iter()
-        .map(|meridian| plan.lay_out_round(&rig, after, &[*meridian]).unwrap().seconds)
+        .map(|meridian| {
+            let one = Further::Sweeps(vec![*meridian]);
+            plan.lay_out_round(&rig, after, &one).unwrap().seconds
+        })
         .sum();
     let both_ways = seconds(&rig);
     assert!(both_ways < 0.7 * alone, "{both_ways} s, one by one {alone} s");
     rig.axes[0].approach = Approach::Positive;
     rig.axes[0].run_up = 0.01;
     assert!(seconds(&rig) > both_ways);
-    let steps = plan.lay_out_round(&rig, after, &wanted).unwrap().steps;
+    let steps = plan.lay_out_round(&rig, after, &all).unwrap().steps;
     assert!(steps.iter().filter_map(|step| step.swept).all(|swept| swept.travel.0[0] > 0));
 }
 
@@ -182,4 +188,18 @@ fn what_contradicts_itself_is_refused_with_its_key() {
     let short = read(SCHEDULE, "[stop]\nrig_time_s_max = 30").unwrap();
     let problem = short.lay_out(&rig(), None).unwrap_err().to_string();
     assert!(problem.contains("rig_time_s_max") && problem.contains("first round"), "{problem}");
+}
+
+#[test]
+fn a_round_may_be_a_dark_reading_where_the_axes_stand() {
+    let (plan, rig) = (plan(), rig());
+    let sequence = plan.lay_out(&rig, None).unwrap();
+    let after = After::steps(&rig, &sequence.steps);
+    let dwell = Duration::from_millis(7_500);
+    let round = plan.lay_out_round(&rig, after, &Further::Dark(dwell)).unwrap();
+    let [step] = round.steps[..] else { panic!("{:?}", round.steps) };
+    assert_eq!((step.id, step.dwell, step.counts), (after.step, dwell, after.here));
+    assert_eq!((step.kind, step.shutter), (ReadingKind::Dark, Shutter::Closed));
+    // Nothing moves.
+    assert!((7.5..7.6).contains(&round.seconds), "{}", round.seconds);
 }

@@ -134,10 +134,19 @@ impl<'p> Builder<'p> {
         self.push(ReadingKind::Reference, self.reference, self.plan.reference.dwell);
     }
 
+    /// Nothing but a dark reading, so long.
+    pub(super) fn dark_alone(mut self, dwell: Duration) -> Vec<Step> {
+        self.dark();
+        if let Some(step) = self.steps.last_mut() {
+            step.dwell = dwell;
+        }
+        self.steps
+    }
+
     /// Where the axes stand already; at home to begin with.
     fn dark(&mut self) {
-        let home = AxisPositions([0.0; 4]);
-        let (positions, counts) = self.steps.last().map_or((home, Latched::ZERO), |step| {
+        let here = (self.rig.positions(self.here), self.here);
+        let (positions, counts) = self.steps.last().map_or(here, |step| {
             if step.swept.is_none() {
                 return (step.positions, step.counts);
             }

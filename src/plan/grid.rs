@@ -166,6 +166,18 @@ fn evenly(i: u32, region: &Region) -> Pose {
     }
 }
 
+/// The place of the k-th of meridians that are dealt out over so many, so that neighbours stand far
+/// apart: about 0.38 of the places from one to the next, and no divisor of their count.
+pub(super) fn dealt(k: usize, places: usize) -> usize {
+    let wanted = (places * 382).div_ceil(1000).max(1);
+    let stride = (wanted..=wanted + places).find(|stride| gcd(*stride, places) == 1).unwrap_or(1);
+    (k * stride) % places
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;

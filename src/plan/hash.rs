@@ -55,6 +55,10 @@ impl Plan {
                 hash.number(number);
             }
             hash.number(adaptive.narrowest_feature_deg);
+            // Plans without it are called what they were called before there was one.
+            if let Some(asked) = adaptive.exitance_within_region_relative {
+                hash.number(asked);
+            }
         }
         for step in &sequence.steps {
             hash.step(step);

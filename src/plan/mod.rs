@@ -43,7 +43,7 @@ pub use cost::{Prediction, StepTime, TimeLeft, time_of};
 pub use expect::Expect;
 pub use hash::{PlanHash, fnv1a64};
 pub use rewrite::{Change, rewrite};
-pub use round::{After, Meridian, Round, SweepPace};
+pub use round::{After, Further, Meridian, Round, SweepPace};
 pub use sequence::{RESUME_IDS_FROM, Sequence, Step, Swept, Target, WARM_UP_IDS_FROM, closing};
 pub use terms::{Dark, DarkMethod, Order, Plan, Reference, Region, Schedule, Stop, WarmUp};
 pub use wanted::{Asked, Wanted};

@@ -30,6 +30,15 @@ pub struct Meridian {
     pub window: Duration,
 }
 
+/// What is measured further.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Further {
+    /// These sweeps, closed by a reference and a dark reading.
+    Sweeps(Vec<Meridian>),
+    /// A dark reading, so long: what is known of the dark level is all that is missing.
+    Dark(Duration),
+}
+
 /// What a round follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct After {
@@ -99,11 +108,19 @@ impl Plan {
         &self,
         rig: &Rig,
         after: After,
-        wanted: &[Meridian],
+        wanted: &Further,
     ) -> Result<Round, Problem> {
         let gain = self.gain_on(rig)?;
         let reference = self.reference_on(rig)?;
         let builder = Builder::new(self, rig, gain, reference).following(after.step, after.here);
+        let wanted = match wanted {
+            Further::Sweeps(wanted) => wanted,
+            Further::Dark(dwell) => {
+                let steps = builder.dark_alone(*dwell);
+                let seconds = time_of(rig, after.here, &steps);
+                return Ok(Round { steps, seconds });
+            }
+        };
         let (steps, _) = self.fill_round(rig, after, wanted, builder)?;
         let seconds = time_of(rig, after.here, &steps);
         Ok(Round { steps, seconds })

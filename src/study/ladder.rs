@@ -119,6 +119,9 @@ impl Rung {
             Schedule::Adaptive(adaptive) => Schedule::Adaptive(Adaptive {
                 radiance_relative: adaptive.radiance_relative.map(|error| error / finer),
                 exitance_relative: adaptive.exitance_relative.map(|error| error / finer),
+                exitance_within_region_relative: adaptive
+                    .exitance_within_region_relative
+                    .map(|error| error / finer),
                 ..adaptive
             }),
             list @ Schedule::List { .. } => list,
@@ -168,11 +171,19 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
             );
             changes
         }
-        Schedule::Adaptive(Adaptive { radiance_relative, exitance_relative, .. }) => {
-            let radiance = radiance_relative.map(|error| set("radiance_relative", error));
-            let exitance = exitance_relative.map(|error| set("exitance_relative", error));
-            radiance.into_iter().chain(exitance).collect()
-        }
+        Schedule::Adaptive(Adaptive {
+            radiance_relative,
+            exitance_relative,
+            exitance_within_region_relative,
+            ..
+        }) => [
+            ("radiance_relative", radiance_relative),
+            ("exitance_relative", exitance_relative),
+            ("exitance_within_region_relative", exitance_within_region_relative),
+        ]
+        .into_iter()
+        .filter_map(|(key, error)| Some(set(key, error?)))
+        .collect(),
         Schedule::List { .. } => Vec::new(),
     }
 }

@@ -9,7 +9,7 @@ use crate::cli::results::Results;
 use crate::cli::setup::Setup;
 use crate::cli::text::{percent, with_uncertainty};
 use crate::report::Table;
-use crate::rig::calibration::{Calibrated, Effect, Fitted};
+use crate::rig::calibration::{Calibrated, Fitted};
 
 /// Nodes along each side of the region for the true intensity.
 const NODES: usize = 24;
@@ -125,16 +125,7 @@ impl Row {
 /// The fit without what scales all readings alike: the detector's responsivity and throughput, and the
 /// gain where only one range was used.
 pub(super) fn without_scale(fit: &Fit, calibrated: &Calibrated) -> Fit {
-    let samples = &calibrated.samples;
-    let is_everywhere = |gain: u8| samples.iter().all(|sample| sample.gain == gain);
-    let is_scale = |effect: Effect| match effect {
-        Effect::Scale { gain } => gain.is_none_or(is_everywhere),
-        Effect::Beam { .. } => true,
-        _ => false,
-    };
-    let scales = calibrated.components.iter().filter(|component| is_scale(component.effect));
-    let names: Vec<&str> = scales.map(|component| component.name.as_str()).collect();
-    fit.without_scale(&names)
+    fit.without_scale(&calibrated.scales())
 }
 
 /// The true intensity of the region along the normal: the radiance over the region, by a product

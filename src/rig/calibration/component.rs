@@ -1,7 +1,7 @@
 //! What many samples share: being off by it shifts them all together, so that no average over them
 //! makes it smaller.
 
-use super::{Dark, Sample};
+use super::{Calibrated, Dark, Sample};
 use radiometry::beam::Beam;
 
 use crate::rig::{AXES, AxisName, AxisPositions, Misalignment, Pose, Rig, forward};
@@ -92,6 +92,21 @@ impl Component {
             Effect::Alignment { of } => of.ray_seen(sample.positions, times * self.u),
             _ => sample.pose,
         }
+    }
+}
+
+impl Calibrated {
+    /// The components that scale all samples alike: the detector's responsivity and throughput, and
+    /// the gain where only one range was used.
+    pub fn scales(&self) -> Vec<&str> {
+        let is_everywhere = |gain: u8| self.samples.iter().all(|sample| sample.gain == gain);
+        let is_scale = |effect: Effect| match effect {
+            Effect::Scale { gain } => gain.is_none_or(is_everywhere),
+            Effect::Beam { .. } => true,
+            _ => false,
+        };
+        let scales = self.components.iter().filter(|component| is_scale(component.effect));
+        scales.map(|component| component.name.as_str()).collect()
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Dark {
     pub gain: u8,
     /// Dark readings used: those that are not saturated.
     pub readings: usize,
+    /// ADC readings that these average, all together.
+    pub adc_readings: u32,
     /// The level, ampere.
     pub level_a: f64,
     /// Its standard uncertainty, in the detector's radiance unit; common to all samples of the
@@ -77,5 +79,5 @@ fn level(detector: &Detector, gain: u8, readings: &[Reading]) -> Result<Dark, Ca
         variance = variance.max(weighted(&square) / dof);
     }
     let u_radiance = libm::sqrt(variance);
-    Ok(Dark { gain, readings: used.len(), level_a, u_radiance })
+    Ok(Dark { gain, readings: used.len(), adc_readings: n_all, level_a, u_radiance })
 }

@@ -6,8 +6,10 @@
 
 mod between;
 mod checked;
+mod dark;
 mod gaps;
 mod scans;
+mod verdict;
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -17,16 +19,17 @@ use serde::{Deserialize, Serialize};
 use spanned_toml::Problem;
 
 use crate::plan::{
-    Adaptive, After, Meridian, Plan, Prediction, SWEEPS_MAX, Step, SweepPace, time_of,
+    Adaptive, After, Further, Meridian, Plan, Prediction, SWEEPS_MAX, Step, SweepPace, time_of,
 };
 use crate::rig::calibration::{Calibrated, calibrate};
 use crate::rig::{AxisPositions, Latched, Reading, Rig};
-use crate::study::percent;
 use between::Between;
 use checked::{Checked, checked};
 use scans::{Scan, scans};
+use verdict::largest;
 
 pub use gaps::Gaps;
+pub use verdict::Verdict;
 
 /// A round takes this part of the time so far ...
 const GROWTH: f64 = 0.35;
@@ -38,10 +41,6 @@ const SWEEPS_PER_CHECK: usize = 4;
 const CHECKS_MAX: u32 = 400;
 /// The fit is asked once the interpolation's own error is no more than this many times the target.
 const FIT_FROM: f64 = 1.5;
-/// A fit that stays this far above what lies between the sweeps, twice, can't follow them ...
-const STUCK: f64 = 2.0;
-/// ... if a round did not bring its error down to this part.
-const STUCK_GAIN: f64 = 0.9;
 
 /// What a decision rests on beside the readings.
 #[derive(Debug, Clone)]
@@ -82,28 +81,23 @@ pub struct Account {
     pub noise_relative: Option<f64>,
     /// The exitance's combined uncertainty, where the plan asks for it.
     pub exitance_u_relative: Option<f64>,
+    /// That of the exitance within the region, without the common scale, where the plan asks for it.
+    #[serde(default)]
+    pub exitance_within_region_u_relative: Option<f64>,
+    /// Uncertainty of the dark level, relative to the radiance's RMS.
+    #[serde(default)]
+    pub dark_relative: Option<f64>,
     /// What has not been looked at.
     pub gaps: Gaps,
     /// How it ended; `None` while it goes on.
     pub verdict: Option<Verdict>,
 }
 
-/// How a run ended.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Whether all targets were met.
-    pub is_met: bool,
-    /// One sentence.
-    pub why: String,
-    /// The largest part of the error that is left, and how large it is.
-    pub largest: Option<(String, f64)>,
-}
-
 /// What follows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Choice {
-    /// These sweeps.
-    Measure(Vec<Meridian>),
+    /// This.
+    Measure(Further),
     /// Nothing.
     Enough,
 }
@@ -221,6 +215,9 @@ fn looked<T>(
         checked_upper_relative: None,
         noise_relative: Some(between.noise_relative()),
         exitance_u_relative: None,
+        exitance_within_region_u_relative: None,
+        dark_relative: dark::known(&calibrated)
+            .map(|dark| dark.u_radiance / libm::sqrt(between.mean_square())),
         gaps: Gaps::of(terms, &scans),
         verdict: None,
     };
@@ -252,9 +249,9 @@ impl State<'_> {
         }
         let mut ending = self.met(account).or_else(|| self.hopeless(account));
         if ending.is_none() {
-            let wanted = self.next(steps);
+            let wanted = self.next(account, steps);
             match wanted {
-                Ok(wanted) => return Choice::Measure(wanted),
+                Ok(further) => return Choice::Measure(further),
                 Err(why) => ending = Some(self.last_word(account, why)),
             }
         }
@@ -284,92 +281,15 @@ impl State<'_> {
                 account.checked_upper_relative = Some(upper_relative);
             }
         }
-        if self.terms.adaptive.exitance_relative.is_some() {
+        if self.terms.adaptive.asks_exitance() {
             let Terms { plan, region, optics, .. } = self.terms;
             let whole = self.calibrated.fit(region, &plan.fit, optics.as_ref());
             self.whole = whole.ok().map(|fitted| fitted.fit);
-            let exitance = self.whole.as_ref().map(fit::Fit::exitance);
-            let lit = exitance.filter(|exitance| exitance.value > 0.0);
-            account.exitance_u_relative = lit.map(|exitance| exitance.u / exitance.value);
+            account.exitance_u_relative = self.whole.as_ref().and_then(|fit| u(fit.exitance()));
+            let shape = self.whole.as_ref().map(|fit| fit.without_scale(&self.calibrated.scales()));
+            account.exitance_within_region_u_relative =
+                shape.and_then(|fit| u(fit.exitance_within_region()));
         }
-    }
-
-    /// The verdict on targets that are met, both of them if there are two.
-    fn met(&self, account: &Account) -> Option<Verdict> {
-        let mut said = Vec::new();
-        if let Some(asked) = self.terms.adaptive.radiance_relative {
-            let upper = account.checked_upper_relative?.max(account.between_relative?);
-            if upper > asked {
-                return None;
-            }
-            said.push(format!(
-                "radiance to {} by the checks (below {} with 90 % confidence) and {} by what lies \
-                 between the sweeps, asked {}",
-                percent(account.checked_relative?),
-                percent(account.checked_upper_relative?),
-                percent(account.between_relative?),
-                percent(asked)
-            ));
-        }
-        if let Some(asked) = self.terms.adaptive.exitance_relative {
-            let u = account.exitance_u_relative?;
-            if u > asked {
-                return None;
-            }
-            said.push(format!("exitance to {}, asked {}", percent(u), percent(asked)));
-        }
-        let Account { round, sweeps, .. } = account;
-        let s = if *round == 1 { "" } else { "s" };
-        let why = format!("{} after {sweeps} sweeps in {round} round{s}", said.join(", "));
-        Some(Verdict { is_met: true, why, largest: None })
-    }
-
-    /// The verdict on targets that more sweeps won't meet.
-    fn hopeless(&self, account: &Account) -> Option<Verdict> {
-        let not_met = |why: String, largest| Some(Verdict { is_met: false, why, largest });
-        if let Some(asked) = self.terms.adaptive.exitance_relative
-            && let Some((name, shared)) = self.shared()
-            && shared > asked
-        {
-            let why = format!(
-                "exitance to {} can't be reached: what all readings share is {}",
-                percent(asked),
-                percent(shared)
-            );
-            return not_met(why, Some((name, shared)));
-        }
-        let asked = self.terms.adaptive.radiance_relative?;
-        let (checked, between) = (account.checked_relative?, account.between_relative?);
-        let before = self.before.last()?;
-        let (last, last_between) = (before.checked_relative?, before.between_relative?);
-        // What the checks' own noise may have added to it does not speak against the functions.
-        let upper = account.checked_upper_relative.unwrap_or(checked);
-        let least = libm::sqrt((2.0 * checked * checked - upper * upper).max(0.0));
-        let is_stuck = least > asked
-            && between <= asked
-            && least > STUCK * between
-            && last > STUCK * last_between
-            && checked > STUCK_GAIN * last;
-        if !is_stuck {
-            return None;
-        }
-        let why = format!(
-            "radiance to {} can't be reached by more sweeps: the fit's functions stay {} off",
-            percent(asked),
-            percent(checked)
-        );
-        not_met(why, largest(account))
-    }
-
-    /// The exitance's uncertainty by what all readings share, and the largest part of it.
-    fn shared(&self) -> Option<(String, f64)> {
-        let fit = self.whole.as_ref()?;
-        let value = fit.exitance().value;
-        let parts = fit.contributions();
-        let shared = parts.iter().skip(1);
-        let square: f64 = shared.clone().map(|part| part.u * part.u).sum();
-        let largest = shared.max_by(|a, b| a.u.total_cmp(&b.u))?;
-        (value > 0.0).then(|| (largest.name.clone(), libm::sqrt(square) / value))
     }
 
     /// The pace of sweeps that are not chosen for their place: the plan's where a value's noise is below
@@ -391,7 +311,7 @@ impl State<'_> {
     }
 
     /// The next round, or why there is none.
-    fn next(&mut self, steps: &[Step]) -> Result<Vec<Meridian>, String> {
+    fn next(&mut self, account: &Account, steps: &[Step]) -> Result<Further, String> {
         let terms = self.terms;
         if self.scans.len() >= SWEEPS_MAX {
             return Err(format!("{} sweeps are as many as are decided upon", self.scans.len()));
@@ -400,6 +320,14 @@ impl State<'_> {
         let so_far_s = time_of(&terms.rig, Latched::ZERO, steps);
         let most = terms.plan.stop.rig_time_max.map_or(f64::INFINITY, |most| most.as_secs_f64());
         let left_s = most - Prediction::homing_s_of(&terms.rig) - so_far_s;
+        if let Some(dwell) = self.longer_dark(account) {
+            let dwell = dwell.min(Duration::try_from_secs_f64(left_s).unwrap_or_default());
+            return if dwell >= terms.plan.dark.dwell {
+                Ok(Further::Dark(dwell))
+            } else {
+                used_up()
+            };
+        }
         let span_rad = 2.0 * terms.plan.region.theta_max_rad;
         let sweep_s = terms.pace().sweep_s(span_rad);
         let wanted_s = (GROWTH * so_far_s).max(SWEEPS_LEAST * sweep_s).min(left_s);
@@ -419,9 +347,9 @@ impl State<'_> {
         let count = (chosen.len() / SWEEPS_PER_CHECK).max(1);
         let mut checks = terms.further_checks(steps, count, window);
         while !(chosen.is_empty() && checks.is_empty()) {
-            let wanted: Vec<Meridian> = chosen.iter().chain(&checks).copied().collect();
-            match terms.plan.lay_out_round(&terms.rig, after, &wanted) {
-                Ok(round) if round.seconds <= left_s => return Ok(wanted),
+            let further = Further::Sweeps(chosen.iter().chain(&checks).copied().collect());
+            match terms.plan.lay_out_round(&terms.rig, after, &further) {
+                Ok(round) if round.seconds <= left_s => return Ok(further),
                 Ok(_) => {}
                 Err(problem) => return Err(format!("the rig can't fly what is wanted: {problem}")),
             }
@@ -429,20 +357,17 @@ impl State<'_> {
                 checks.pop();
             }
         }
-        Err("the plan's time is used up".to_owned())
+        used_up()
     }
 }
 
-/// The largest part of the radiance's error.
-fn largest(account: &Account) -> Option<(String, f64)> {
-    let between = account.between_relative?;
-    let checked = account.checked_relative.unwrap_or(0.0);
-    let beyond = libm::sqrt((checked * checked - between * between).max(0.0));
-    Some(if beyond > between {
-        ("what the fit's functions can't follow".to_owned(), beyond)
-    } else {
-        ("what lies between the sweeps".to_owned(), between)
-    })
+fn used_up<T>() -> Result<T, String> {
+    Err("the plan's time is used up".to_owned())
+}
+
+/// Relative, of what is positive.
+fn u(estimate: fit::Estimate) -> Option<f64> {
+    (estimate.value > 0.0).then(|| estimate.u / estimate.value)
 }
 
 /// Nothing can be decided.
@@ -457,6 +382,8 @@ fn nothing(terms: &Terms, round: u32, rig_s: f64, why: &str) -> Box<Account> {
         checked_upper_relative: None,
         noise_relative: None,
         exitance_u_relative: None,
+        exitance_within_region_u_relative: None,
+        dark_relative: None,
         gaps: Gaps::of(terms, &[]),
         verdict: Some(Verdict {
             is_met: false,
