@@ -193,7 +193,8 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// quadrature: `x_count`, `y_count`, `theta_count`, `phi_count` ·
 /// sweep: `x_count`, `y_count`, `phi_step_deg`; `narrowest_feature_deg`, the full width at half
 /// maximum of the narrowest feature that is looked for (default: `[expect]`'s), or
-/// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`). Sweeps have their own order ·
+/// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`); `interleaved`, whether each meridian
+/// is flown at one of the places alone (default false). Sweeps have their own order ·
 /// adaptive: see [`Adaptive::read`].
 /// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
 fn read_schedule(
@@ -270,6 +271,7 @@ fn read_sweep(table: &Table<'_>, expect: &Expect) -> Result<Schedule, Problem> {
         x_count: read_count(table, "x_count", COUNT_MAX)?,
         y_count: read_count(table, "y_count", COUNT_MAX)?,
         phi_step_deg: read_turn_step(table, "phi_step_deg")?,
+        is_interleaved: table.flag("interleaved")?.unwrap_or(false),
         speed_deg_per_s,
         narrowest_feature_deg: table.number("narrowest_feature_deg", STEP_DEG)?.or(expected_deg),
     };

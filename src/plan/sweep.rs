@@ -91,14 +91,26 @@ pub(super) fn targets(rig: &Rig, lines: &[Line]) -> Vec<Target> {
 
 /// The sweeps of a plan, in the order in which they are flown.
 pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
-    let Schedule::Sweep { x_count, y_count, phi_step_deg, .. } = plan.schedule else {
+    let Schedule::Sweep { x_count, y_count, phi_step_deg, is_interleaved, .. } = plan.schedule
+    else {
         return Ok(Vec::new());
     };
     check_wire(plan, rig)?;
     let arc = Arc::of(plan, rig, phi_step_deg);
+    let places = places(plan, x_count, y_count);
+    let flown = if is_interleaved { 1 } else { places.len() };
+    if is_interleaved && arc.tables.len() < places.len() {
+        return Err(plan.problem(
+            "schedule",
+            "interleaved",
+            &format!("{} sweeps for {} places", arc.tables.len(), places.len()),
+            "at least one sweep a place",
+            "lower phi_step_deg, or take fewer places",
+        ));
+    }
     let windows = cut(plan, rig, arc.theta, plan.dwell)?;
     let per_meridian: u64 = windows.iter().map(|(_, count)| u64::from(*count)).sum();
-    let count = per_meridian * arc.tables.len() as u64 * u64::from(x_count) * u64::from(y_count);
+    let count = per_meridian * arc.tables.len() as u64 * flown as u64;
     if count > u64::from(TARGETS_MAX) {
         return Err(plan.problem(
             "schedule",
@@ -111,8 +123,10 @@ pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
     let mut lines = Vec::new();
     let mut lowest = 0;
     let mut is_back = false;
-    for (place, (x_m, y_m)) in places(plan, x_count, y_count).into_iter().enumerate() {
-        let mut tables = arc.tables.clone();
+    for (place, &(x_m, y_m)) in places.iter().enumerate() {
+        let is_here = |k: &usize| !is_interleaved || grid::dealt(*k, places.len()) == place;
+        let here = (0..arc.tables.len()).filter(is_here);
+        let mut tables: Vec<f64> = here.map(|k| arc.tables[k]).collect();
         if place % 2 == 1 {
             tables.reverse();
         }

@@ -202,3 +202,28 @@ fn repeats_turn_back_and_the_hash_knows_the_flight() {
     let hash = |plan: &Plan| plan.hash(&plan.lay_out(&rig, None).unwrap());
     assert_ne!(hash(&once), hash(&slow));
 }
+
+#[test]
+fn interleaved_meridians_are_flown_once_each_at_all_places_alike() {
+    let rig = Rig::built_in().unwrap();
+    let interleaved = with("phi_step_deg = 30", "phi_step_deg = 15\ninterleaved = true");
+    let sequence = plan(&interleaved).lay_out(&rig, None).unwrap();
+    // Twelve planes over four places, instead of 48.
+    assert_eq!((sequence.targets.len(), sequence.sweeps()), (12 * 320, 12));
+    let mut seen: Vec<([i32; 2], i32)> = windows(&sequence)
+        .into_iter()
+        .filter(|step| step.swept.unwrap().first == step.id)
+        .map(|step| ([step.counts.0[2], step.counts.0[3]], step.counts.0[1]))
+        .collect();
+    seen.sort_by_key(|(_, table)| *table);
+    let turns: Vec<i32> = seen.windows(2).map(|pair| pair[1].1 - pair[0].1).collect();
+    assert!(turns.iter().all(|turn| *turn == 15_000), "{turns:?}");
+    assert!(seen.windows(2).all(|pair| pair[0].0 != pair[1].0), "{seen:?}");
+    for place in seen.iter().map(|(place, _)| *place) {
+        assert_eq!(seen.iter().filter(|(other, _)| *other == place).count(), 3);
+    }
+    // A place without a sweep is no place.
+    let few = plan(&interleaved.replace("phi_step_deg = 15", "phi_step_deg = 60"));
+    let refused = few.lay_out(&rig, None).unwrap_err().to_string();
+    assert!(refused.contains("interleaved") && refused.contains("3 sweeps for 4"), "{refused}");
+}

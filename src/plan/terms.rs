@@ -118,6 +118,9 @@ pub enum Schedule {
         y_count: u32,
         /// Between meridians, degrees.
         phi_step_deg: f64,
+        /// Whether the meridians are dealt out over the places, each flown at one of them alone;
+        /// otherwise all are flown at every place.
+        is_interleaved: bool,
         /// The arm's speed, degrees a second; as fast as the narrowest feature bears if absent.
         speed_deg_per_s: Option<f64>,
         /// Full width at half maximum of the narrowest feature that is looked for, degrees.

@@ -105,12 +105,14 @@ impl Rung {
                 x_count,
                 y_count,
                 phi_step_deg,
+                is_interleaved,
                 speed_deg_per_s,
                 narrowest_feature_deg,
             } => Schedule::Sweep {
                 x_count,
                 y_count,
                 phi_step_deg: finer_pairs(phi_step_deg),
+                is_interleaved,
                 speed_deg_per_s: speed_deg_per_s.map(|speed| speed * self.speed / finer),
                 narrowest_feature_deg: narrowest_feature_deg
                     .map(|width| finer_step(width * self.speed)),

@@ -135,6 +135,7 @@ fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
         "gamma_step_deg",
         "c_step_deg",
         "phi_step_deg",
+        "interleaved",
         "speed_deg_per_s",
         "order",
         "repeat",
@@ -162,7 +163,7 @@ fn grid(plan: &Plan) -> Option<Vec<Change>> {
     };
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
     let narrowest_feature_deg = narrowest_feature_deg.or(declared).unwrap_or(phi_step_deg);
-    let gone = ["speed_deg_per_s", "narrowest_feature_deg", "window_ms"];
+    let gone = ["interleaved", "speed_deg_per_s", "narrowest_feature_deg", "window_ms"];
     let mut changes: Vec<Change> =
         gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
     changes.push(Change::set("schedule", "kind", "\"raster\""));
@@ -193,6 +194,7 @@ mod tests {
             x_count: 2,
             y_count: 3,
             phi_step_deg: 30.0,
+            is_interleaved: false,
             speed_deg_per_s: None,
             narrowest_feature_deg: Some(10.0),
         };
