@@ -15,6 +15,7 @@ mod failure;
 mod fit;
 mod folder;
 mod frontier;
+mod halt;
 mod hand;
 mod inputs;
 mod monte_carlo;

@@ -32,6 +32,8 @@ const COLOURS: [(&str, &str); 7] = [
 ];
 /// Of these, the first that is a series'.
 const FIRST_SERIES: usize = 3;
+/// What is no series, a line to compare with: in the ink of the axes.
+pub const INK: usize = usize::MAX;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,7 +191,11 @@ impl Series {
     }
 
     fn plots(&self) -> Vec<Plot> {
-        let colour = COLOURS[FIRST_SERIES + self.colour % (COLOURS.len() - FIRST_SERIES)].0;
+        let place = match self.colour {
+            INK => 0,
+            colour => FIRST_SERIES + colour % (COLOURS.len() - FIRST_SERIES),
+        };
+        let colour = COLOURS[place].0;
         let points = self.points.iter().copied();
         match self.stroke {
             Stroke::Dots | Stroke::Points => {

@@ -17,7 +17,7 @@ mod svg;
 mod ticks;
 
 pub use bars::Budget;
-pub use chart::{Chart, Series, Stroke};
+pub use chart::{Chart, INK, Series, Stroke};
 pub use frontier::frontier_pictures;
 pub use hemisphere::Hemisphere;
 pub use page::{Report, Section, Table};

@@ -12,6 +12,7 @@ use crate::cli::acquire::{Acquired, Pace, acquire};
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::folder::create;
+use crate::cli::halt::ends_when_stopped;
 use crate::cli::output::{note, say, write_out};
 use crate::cli::parallel::in_parallel;
 use crate::cli::results::{fit_of, fit_region};
@@ -76,6 +77,12 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
     let work = folder.join("runs");
     std::fs::create_dir_all(&work)
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
+    let made = folder.clone();
+    let clean = move || {
+        // Ours, and nothing in it is whole.
+        let _ = std::fs::remove_dir_all(made);
+    };
+    ends_when_stopped(clean, "stopped: nothing was written".to_owned())?;
     let studied = study(families, runs, args, &work)?;
     // Ours, and empty but for runs that were refused.
     let _ = std::fs::remove_dir_all(&work);

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::{Asked, Found, NAME};
 use crate::cli::study::document::Document;
 use crate::cli::text::{percent, table};
-use crate::report::{Chart, Series, Stroke};
+use crate::report::{Chart, INK, Series, Stroke};
 use crate::study::cost::{Aim, Compared, Reached, Scene, Strategy, Target, compared};
 use crate::study::median;
 
@@ -47,7 +47,10 @@ pub(super) fn section(found: &Found, document: &Document) -> String {
          strategy alike, and nothing else.\n\n\
          - Interpolation: cubic splines along θ through the pole, round φ, along x and y (not-a-knot), \
          through the readings as they are. Its ladders have grids of a single place too, which only \
-         somebody who knows the scene would dare; those of the fits have not.\n\
+         somebody who knows the scene would dare; those of the fits have not, but sweeps that are \
+         interleaved over the places instead, with dark readings of 4 s. Adaptive runs begin with \
+         meridians 20° apart, between which a lobe of 15° shows, or as far apart as the narrowest \
+         feature asks, 6° of arc at 80°; they are told both targets, of L and of M.\n\
          - Fit: as `gonio run` does it where the plan leaves the basis open: chosen from the readings \
          by leaving out sweeps, each reading the mean over its beam and its way.\n\
          - L: RMS error of the radiance over region and directions, weighted with cos θ dω dA. M: error \
@@ -265,7 +268,7 @@ pub(super) fn picture(found: &Found) -> String {
         0,
         Series {
             name: "as long".to_owned(),
-            colour: 3,
+            colour: INK,
             stroke: Stroke::Dashes,
             points: vec![(ends.0, ends.0), (ends.1, ends.1)],
             errors: Vec::new(),
