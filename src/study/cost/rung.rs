@@ -58,9 +58,9 @@ impl Strategy {
         !matches!(self, Self::RestInterpolated | Self::FlightInterpolated)
     }
 
-    /// Whether the rung is one of its own.
+    /// Whether the rung is one of its own. What is interleaved is no grid to interpolate on.
     pub const fn takes(self, rung: &Rung) -> bool {
-        !self.is_fitted() || rung.places > 1
+        if self.is_fitted() { rung.places > 1 } else { !rung.is_interleaved }
     }
 }
 
@@ -71,15 +71,20 @@ pub struct Rung {
     pub motion: Motion,
     /// Columns of places, and as many rows; of an adaptive one those of its first round.
     pub places: u32,
-    /// Meridians, an even number; none of an adaptive one, which decides.
+    /// Meridians, an even number; of an adaptive one those that it begins with, none where they are as
+    /// many as the narrowest feature asks.
     pub meridians: u32,
+    /// Whether each meridian is flown at one place alone.
+    pub is_interleaved: bool,
     /// Between circles, of a raster at rest, degrees. A window's way follows from the feature that
     /// is looked for.
     pub theta_step_deg: f64,
     /// How many times as long as usual a reading is.
     pub longer: u32,
-    /// What an adaptive plan is told to reach: the radiance's RMS error, relative.
-    pub wanted: Option<f64>,
+    /// A dark reading, milliseconds.
+    pub dark_ms: u32,
+    /// What an adaptive plan is told to reach: the errors of radiance and exitance, relative.
+    pub wanted: Option<(f64, f64)>,
 }
 
 /// The ladder of a motion, not in the order of time: what a rung takes the rig tells. A dim source
@@ -89,9 +94,20 @@ pub fn ladder(motion: Motion, is_dim: bool) -> Vec<Rung> {
         motion,
         places,
         meridians,
+        is_interleaved: false,
         theta_step_deg,
         longer,
+        dark_ms: DARK_MS,
         wanted: None,
+    };
+    let dealt = |longer: &[u32]| -> Vec<Rung> {
+        let of = |&(places, meridians): &(u32, u32)| {
+            let rung = rung(places, 0.0, meridians, 1);
+            let of =
+                move |&longer| Rung { is_interleaved: true, dark_ms: DARK_LONG_MS, longer, ..rung };
+            longer.iter().map(of)
+        };
+        INTERLEAVED.iter().flat_map(of).collect()
     };
     let longer: &[u32] = if is_dim { &[1, 4, 16] } else { &[1] };
     let with = |grids: &[(u32, f64, u32)]| -> Vec<Rung> {
@@ -103,11 +119,12 @@ pub fn ladder(motion: Motion, is_dim: bool) -> Vec<Rung> {
     match (motion, is_dim) {
         (Motion::StopAndGo, false) => with(&AT_REST),
         (Motion::StopAndGo, true) => with(&AT_REST_DIM),
-        (Motion::Sweep, false) => with(&IN_FLIGHT),
-        (Motion::Sweep, true) => with(&IN_FLIGHT_DIM),
+        (Motion::Sweep, false) => [with(&IN_FLIGHT), dealt(&[1])].concat(),
+        (Motion::Sweep, true) => [with(&IN_FLIGHT_DIM), dealt(&[1, 2, 4])].concat(),
         (Motion::Adaptive, _) => {
-            let of = |wanted| Rung { wanted: Some(wanted), ..rung(2, 0.0, 0, 1) };
-            WANTED.map(of).to_vec()
+            let of =
+                |(wanted, meridians)| Rung { wanted: Some(wanted), ..rung(2, 0.0, meridians, 1) };
+            DECIDING.map(of).to_vec()
         }
     }
 }
@@ -117,10 +134,18 @@ impl Rung {
     pub fn name(&self) -> String {
         let Self { places, meridians, theta_step_deg, .. } = self;
         let dwell_ms = self.dwell_ms();
-        if let Some(wanted) = self.wanted {
-            return format!("until L {} %, windows of {dwell_ms} ms", 100.0 * wanted);
+        if let Some((radiance, exitance)) = self.wanted {
+            let until = format!("until L {} %, M {} %", 100.0 * radiance, 100.0 * exitance);
+            let begun = match meridians {
+                0 => "as many meridians as declared".to_owned(),
+                count => format!("{count} meridians"),
+            };
+            return format!("{until}, begun with {begun}, windows of {dwell_ms} ms");
         }
         let mut name = format!("{places}x{places} places, {meridians} meridians");
+        if self.is_interleaved {
+            name.push_str(" interleaved");
+        }
         // Writing to a string does not fail.
         let _ = match self.motion {
             Motion::StopAndGo => write!(name, ", {theta_step_deg} deg, {dwell_ms} ms"),
@@ -140,7 +165,7 @@ impl Rung {
     /// plan.toml.
     pub fn plan(&self) -> String {
         let Self { places, meridians, theta_step_deg, .. } = self;
-        let dwell_ms = self.dwell_ms();
+        let (dwell_ms, dark_ms) = (self.dwell_ms(), self.dark_ms);
         let turn = format!("phi_step_deg = {}\n", 360.0 / f64::from((*meridians).max(1)));
         let (schedule, turn, dark_every) = match self.motion {
             Motion::StopAndGo => {
@@ -148,17 +173,22 @@ impl Rung {
                 (schedule, turn, DARK_AT_REST)
             }
             Motion::Sweep => {
-                let schedule =
+                let mut schedule =
                     format!("kind = \"sweep\"\nnarrowest_feature_deg = {NARROWEST_DEG}\n");
+                if self.is_interleaved {
+                    schedule.push_str("interleaved = true\n");
+                }
                 (schedule, turn, DARK_IN_FLIGHT)
             }
             Motion::Adaptive => {
-                let wanted = self.wanted.unwrap_or(WANTED[0]);
+                let (radiance, exitance) = self.wanted.unwrap_or(DECIDING[0].0);
                 let schedule = format!(
                     "kind = \"adaptive\"\nnarrowest_feature_deg = {NARROWEST_DEG}\n\
-                     radiance_relative = {wanted}\n"
+                     radiance_relative = {radiance}\n\
+                     exitance_within_region_relative = {exitance}\n"
                 );
-                (schedule, String::new(), DARK_IN_FLIGHT)
+                let turn = if *meridians > 0 { turn } else { String::new() };
+                (schedule, turn, DARK_IN_FLIGHT)
             }
         };
         let stop = match self.motion {
@@ -170,7 +200,7 @@ impl Rung {
              x_mm = [-15, 15]\ny_mm = [-15, 15]\ntheta_max_deg = 80\n\n[schedule]\n{schedule}\
              x_count = {places}\ny_count = {places}\n{turn}\n[dwell]\n\
              dwell_ms = {dwell_ms}\ngain = \"1 nA\"\n\n[dark]\nmethod = \"shutter\"\n\
-             every = {dark_every}\ndwell_ms = 500\n\n[reference]\nx_mm = 0\ny_mm = 0\n\
+             every = {dark_every}\ndwell_ms = {dark_ms}\n\n[reference]\nx_mm = 0\ny_mm = 0\n\
              theta_deg = 0\nphi_deg = 0\nevery = {NEVER}\ndwell_ms = 100\n{stop}"
         )
     }
@@ -184,11 +214,24 @@ const WINDOW_MS: u32 = 25;
 /// Readings in about a minute.
 const DARK_AT_REST: u32 = 130;
 const DARK_IN_FLIGHT: u32 = 1800;
+const DARK_MS: u32 = 500;
+/// Of interleaved sweeps: with the one at the end a tenth of the time of a dozen of them. Two of 0.5 s leave
+/// 0.6 % of the exitance of a lobe 13.5° wide, by the noise model; these 0.2 %.
+const DARK_LONG_MS: u32 = 4000;
 /// Nothing drifts here: at the start and at the end is enough.
 const NEVER: u32 = 1_000_000;
 
-/// What adaptive plans are told to reach, and the end that comes in any case.
-const WANTED: [f64; 3] = [0.05, 0.02, 0.01];
+/// What adaptive plans are told to reach, radiance and exitance, and meridians of the first round: so many
+/// that lobes of 15° show between them, which narrower ones may escape until others follow, or (0) as
+/// many as the narrowest feature asks.
+const DECIDING: [((f64, f64), u32); 5] = [
+    ((0.05, 0.01), 18),
+    ((0.02, 0.003), 18),
+    ((0.05, 0.01), 0),
+    ((0.02, 0.003), 0),
+    ((0.01, 0.003), 0),
+];
+/// The end that comes in any case.
 const ADAPTIVE_S_MAX: u32 = 1500;
 
 /// Places a side, step in θ, meridians.
@@ -228,6 +271,8 @@ const IN_FLIGHT: [(u32, f64, u32); 14] = [
 ];
 const IN_FLIGHT_DIM: [(u32, f64, u32); 5] =
     [(1, 0.0, 4), (1, 0.0, 12), (2, 0.0, 4), (2, 0.0, 12), (3, 0.0, 24)];
+/// Places a side, meridians: each flown at one place alone.
+const INTERLEAVED: [(u32, u32); 7] = [(2, 8), (2, 12), (2, 16), (2, 24), (2, 36), (2, 60), (3, 72)];
 
 #[cfg(test)]
 mod tests {
