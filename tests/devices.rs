@@ -171,6 +171,74 @@ fn what_a_rig_file_gets_wrong_about_its_devices_is_named() {
     encoders.gonio(&["run", "plan.toml"]).refused(&["grbl", "no encoder", "steps"]);
 }
 
+/// A board with two axes: the stage's are fixed.
+fn on_two_axes() -> Bench {
+    let bench = on_devices().with("rig.toml", ", x = \"Z\", y = \"A\"", "").with(
+        "rig.toml",
+        "zero_mm = { x = -55, y = -55 }\n",
+        "",
+    );
+    let rig = bench.text("rig.toml");
+    let (before, after) = rig.split_once("[axes.x]").unwrap();
+    let (_, after) = after.split_once("[detector]").unwrap();
+    let fixed = "[axes.x]\nfixed_mm = 3\nu_zero_mm = 0.05\n\n\
+                 [axes.y]\nfixed_mm = -2\nu_zero_mm = 0.05\n\n";
+    let rig = format!("{before}{fixed}[detector]{after}");
+    bench
+        .having("rig.toml", rig)
+        .with("plan.toml", "x_mm = [-10, 10]\ny_mm = [-10, 10]", "x_mm = [-2, 8]\ny_mm = [-7, 3]")
+        .with("plan.toml", "x_count = 2\ny_count = 2", "x_count = 1\ny_count = 1")
+        .with("plan.toml", "position_degree = 1", "position_degree = 0")
+        .with("plan.toml", "x_mm = 0\ny_mm = 0", "x_mm = 3\ny_mm = -2")
+}
+
+#[test]
+fn an_axis_that_no_device_moves_stands_where_the_rig_file_says() {
+    let bench = on_two_axes();
+    bench.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    let samples = table(&bench, "run/samples.csv");
+    assert!(samples.of("x_mm").iter().all(|x| x.to_bits() == 3.0_f64.to_bits()));
+    assert!(samples.of("y_mm").iter().all(|y| y.to_bits() == (-2.0_f64).to_bits()));
+    // The simulator looks there too: elsewhere the patch ends.
+    assert!(samples.of("radiance_w_per_m2_sr").iter().all(|l| (l / 50.2 - 1.0).abs() < 0.02));
+
+    let run = ["run", "plan.toml", "--out", "other"];
+    let elsewhere = on_two_axes().with("plan.toml", "y_count = 1", "y_count = 2");
+    let before = elsewhere.names();
+    let words = ["plan.toml", "y: -7.000 mm is asked for, but", "fixed at -2.000 mm"];
+    elsewhere.gonio(&run).refused(&words);
+    elsewhere.gonio(&["plan", "plan.toml"]).refused(&words);
+    assert_eq!(elsewhere.names(), before);
+    let words = ["reference", "x: 0.000 mm is asked for", "fixed at 3.000 mm"];
+    let reference = on_two_axes().with("plan.toml", "x_mm = 3", "x_mm = 0");
+    reference.gonio(&run).refused(&words);
+    let jog = ["jog", "--rig", "rig.toml", "--scene", "scene.toml", "--x-mm", "4"];
+    on_two_axes().gonio(&jog).refused(&["x: 4.000 mm is asked for", "fixed at 3.000 mm"]);
+    // The others stay at their switches, beyond the travel.
+    let jog = ["jog", "--rig", "rig.toml", "--scene", "scene.toml", "--theta-deg", "30"];
+    for (bench, x) in [(on_two_axes(), "x 3.000 mm"), (on_devices(), "x 53.000 mm")] {
+        let said = bench.gonio(&jog).well();
+        assert!(said.out.contains("theta 30.000°") && said.out.contains(x), "{said}");
+    }
+
+    let cases: [(&str, &str, &[&str]); 4] = [
+        ("fixed_mm = 3", "fixed_mm = 3\ntravel_mm = [-5, 5]", &["axes.x.travel_mm", "fixed_mm"]),
+        ("fixed_mm = 3\nu_zero_mm = 0.05", "fixed_mm = 3", &["axes.x", "u_zero_mm"]),
+        ("phi = \"Y\"", "phi = \"Y\", x = \"Z\"", &["moves x, which is fixed in [axes.x]"]),
+        ("fixed_mm = 3", "fixed_deg = 3", &["axes.x"]),
+    ];
+    for (from, to, words) in cases {
+        on_two_axes().with("rig.toml", from, to).gonio(&run).refused(words);
+    }
+    let own = Bench::small();
+    let rig = own.text("rig.toml");
+    let (before, after) = rig.split_once("[axes.y]").unwrap();
+    let (_, after) = after.split_once("[detector]").unwrap();
+    let fixed = "[axes.y]\nfixed_mm = 0\nu_zero_mm = 0.05\n\n[detector]";
+    let own = own.having("rig.toml", format!("{before}{fixed}{after}"));
+    own.gonio(&run).refused(&["y is fixed, on a rig with one controller", "[[axes_link]]"]);
+}
+
 #[test]
 fn a_meter_in_another_unit_and_garbage_are_refused_when_they_are_reached() {
     let newport = "driver = \"newport-1830c\"\nranges = [4, 3, 2, 1]\n";

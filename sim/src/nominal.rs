@@ -40,6 +40,8 @@ pub struct Nominal {
 pub struct NominalAxis {
     /// The device's channel: each of 0 to 3 once.
     pub channel: u8,
+    /// Where it stands at its count 0 as stated, units: elsewhere than at 0 where it is fixed.
+    pub home: f64,
     /// Counts a unit; negative if counts fall while the axis's value rises.
     pub counts_per_unit: f64,
     /// Lowest and highest position, counts from the home mark.

@@ -58,6 +58,7 @@ pub(crate) fn misaligned(rig: &Rig, stated: sim::Misalignment) -> sim::Misalignm
 fn nominal_axis(axis: &Axis) -> sim::NominalAxis {
     sim::NominalAxis {
         channel: axis.channel,
+        home: axis.fixed.unwrap_or(0.0),
         counts_per_unit: axis.counts_per_unit,
         travel_counts: axis.count_limits(),
         speed_counts_per_s: axis.counts_per_s(),

@@ -134,7 +134,7 @@ fn sweeps(setup: &Setup) -> Option<String> {
     let (sequence, rig) = (&setup.sequence, &setup.rig);
     let window = sequence.steps.iter().find(|step| step.swept.is_some())?;
     let [theta, ..] = sequence.speeds(rig);
-    let travel = rig.axes[0].position(f64::from(window.swept?.travel.0[0])).abs();
+    let travel = rig.axes[0].distance(f64::from(window.swept?.travel.0[0])).abs();
     if rig.takes_sweeps_at_rest() {
         return Some(format!(
             "{}, but this rig's devices take no reading in flight: at rest, window by window, \

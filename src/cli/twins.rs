@@ -116,22 +116,24 @@ pub(super) fn wanted(makes: &[Make], rig: &Rig) -> Option<Vec<Line>> {
 }
 
 fn by_name(make: Make, rig: &Rig) -> Line {
+    let moved: Vec<&Axis> = rig.axes.iter().filter(|axis| axis.fixed.is_none()).collect();
     let axes = |driver: AxesDriver, zeros: Vec<f64>, baud: u32| {
-        let link = AxesLink { driver, port: None, baud, axes: AXES.to_vec(), zeros };
+        let axes = moved.iter().map(|axis| axis.name).collect();
+        let link = AxesLink { driver, port: None, baud, axes, zeros };
         Line { device: Device::Axes(link), baud }
     };
     let meter = |make: sim::MeterMake, baud: u32| Line { device: Device::Meter(make), baud };
     match make {
         Make::Dynamixel => {
-            let driver =
-                AxesDriver::Dynamixel { ids: vec![1, 2, 3, 4], shutter: None, tolerance_steps: 12 };
-            axes(driver, vec![0.0; AXES.len()], 57_600)
+            let ids = (1..).take(moved.len()).collect();
+            let driver = AxesDriver::Dynamixel { ids, shutter: None, tolerance_steps: 12 };
+            axes(driver, vec![0.0; moved.len()], 57_600)
         }
         Make::Grbl => {
             // It homes upwards, and counts down from its switches.
             let room = |axis: &Axis| if axis.name.is_rotary() { ROOM_RAD } else { ROOM_M };
-            let zeros = rig.axes.iter().map(|axis| -axis.travel.1 - room(axis)).collect();
-            let letters = vec!['X', 'Y', 'Z', 'A'];
+            let zeros = moved.iter().map(|axis| -axis.travel.1 - room(axis)).collect();
+            let letters = ['X', 'Y', 'Z', 'A'].into_iter().take(moved.len()).collect();
             let shutter = Some(GrblOutput::Flood);
             axes(AxesDriver::Grbl { letters, shutter }, zeros, 115_200)
         }

@@ -137,7 +137,7 @@ impl Prediction {
             let leg = |a: i32, b: i32| (f64::from(a) - f64::from(b)).abs();
             let mut counts = leg(from.0[i], via.0[i]) + leg(via.0[i], step.counts.0[i]);
             counts += leg(step.counts.0[i], step.rests_at(rig).0[i]);
-            self.travel[i] += axis.position(counts);
+            self.travel[i] += axis.distance(counts);
         }
     }
 }

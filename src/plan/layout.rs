@@ -107,8 +107,7 @@ impl Plan {
 
     pub(super) fn reference_on(&self, rig: &Rig) -> Result<Place, Problem> {
         let pose = self.reference.pose;
-        let home = AxisPositions([0.0; 4]);
-        let positions = rig.nearest(pose, home).map_err(|e| {
+        let positions = rig.nearest(pose, rig.home()).map_err(|e| {
             let help = "move the reference pose to where the axes reach it";
             self.problem("reference", "", &e.to_string(), "a pose inside the rig's limits", help)
         })?;
@@ -198,7 +197,7 @@ impl Plan {
     ) -> Problem {
         let root = self.document().root();
         match root.table(table) {
-            Ok(Some(table)) => table.problem(key, what, expected, help),
+            Ok(Some(table)) if !key.is_empty() => table.problem(key, what, expected, help),
             _ => root.problem(table, what, expected, help),
         }
     }

@@ -222,7 +222,7 @@ impl Plan {
         };
         let motion = rig.flight(flight).ok();
         let around_us = motion.map_or(0, |motion| motion.before_us() + motion.ramp_us());
-        let span = rig.axes[0].position(f64::from(flight.travel.0[0]) * f64::from(windows));
+        let span = rig.axes[0].distance(f64::from(flight.travel.0[0]) * f64::from(windows));
         let flown_s = flight.window.as_secs_f64() * f64::from(windows);
         Ok(SweepPace { window, seconds_per_rad: flown_s / span, around_s: around_us as f64 / 1e6 })
     }

@@ -129,7 +129,7 @@ impl Sequence {
         let mut speeds = [0.0_f64; 4];
         for (step, swept) in self.steps.iter().filter_map(|step| Some((step, step.swept?))) {
             for ((speed, axis), counts) in speeds.iter_mut().zip(&rig.axes).zip(swept.travel.0) {
-                let units = axis.position(f64::from(counts)).abs();
+                let units = axis.distance(f64::from(counts)).abs();
                 *speed = speed.max(units / step.dwell.as_secs_f64());
             }
         }

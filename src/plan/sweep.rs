@@ -273,7 +273,7 @@ fn lead(rig: &Rig, axis: &Axis, travel: i32, window: Duration) -> Duration {
     if axis.approach == Approach::Either {
         return settle;
     }
-    let speed = axis.position(f64::from(travel)) / window_s(rig, window);
+    let speed = axis.distance(f64::from(travel)) / window_s(rig, window);
     let ramp_m = 0.5 * speed * speed / axis.acceleration;
     let missing_s = ((axis.run_up - ramp_m) / speed).max(0.0);
     settle.max(Duration::from_secs_f64(missing_s))
@@ -315,7 +315,7 @@ fn pinned_travel(plan: &Plan, rig: &Rig, speed_deg_per_s: f64) -> Result<i32, Pr
 /// As far as the narrowest feature bears, or the axis can in a window.
 fn free_travel(plan: &Plan, rig: &Rig, window: Duration) -> i32 {
     let axis = &rig.axes[0];
-    let fastest = axis.position(f64::from(axis.counts_per_s())) * window_s(rig, window);
+    let fastest = axis.distance(f64::from(axis.counts_per_s())) * window_s(rig, window);
     whole(axis, borne(plan, rig).min(fastest)).max(1)
 }
 
@@ -345,7 +345,7 @@ pub(super) fn windows(plan: &Plan, rig: &Rig) -> Vec<Duration> {
         )
     };
     let axis = &rig.axes[0];
-    let fastest = axis.position(f64::from(axis.counts_per_s()));
+    let fastest = axis.distance(f64::from(axis.counts_per_s()));
     let shortest = whole((borne(plan, rig) / fastest).max(1.0 / carried_per_s(rig)));
     let shorter = [shortest].into_iter().filter(|window| *window < plan.dwell);
     let longer = (1..=DOUBLINGS).map(|n| plan.dwell * (1 << n)).filter(|w| *w <= WINDOW_MAX);

@@ -41,7 +41,11 @@ pub struct Axis {
     pub name: AxisName,
     /// Its channel on the device.
     pub channel: u8,
-    /// Lowest and highest position, both allowed, from the home mark. Contains 0.
+    /// Where it stands for good, if nothing moves it: its counts are 0 there, and [`Axis::travel`]
+    /// is that place. Its speeds and counts are then nobody's.
+    pub fixed: Option<f64>,
+    /// Lowest and highest position, both allowed, from the home mark. Contains 0, but for a fixed
+    /// axis.
     pub travel: (f64, f64),
     /// Highest speed, unit a second.
     pub speed: f64,
@@ -80,6 +84,17 @@ pub enum LimitError {
         /// The upper limit.
         limit: f64,
     },
+    /// Nothing moves the axis: leave the other positions out of the plan, or say in the rig file
+    /// where the axis stands now.
+    #[error("{}: {} is asked for, but the rig file has it fixed at {}", .axis.name(), .axis.in_file_unit(*.position), .axis.in_file_unit(*.fixed))]
+    Fixed {
+        /// Which axis.
+        axis: AxisName,
+        /// The position asked for, radians or metres.
+        position: f64,
+        /// Where it stands.
+        fixed: f64,
+    },
     /// Move the region or the target, or check the travel in the rig file.
     #[error("{}: {} is below the lower limit {}", .axis.name(), .axis.in_file_unit(*.position), .axis.in_file_unit(*.limit))]
     Below {
@@ -109,17 +124,25 @@ impl Axis {
     /// The nearest count to a position; saturates far outside any travel.
     #[allow(clippy::cast_possible_truncation)] // saturating, as documented
     pub fn counts(&self, position: f64) -> i32 {
-        libm::round(position * self.counts_per_unit) as i32
+        libm::round((position - self.fixed.unwrap_or(0.0)) * self.counts_per_unit) as i32
     }
 
     /// The position, radians or metres, of a count, which need not be whole.
     pub fn position(&self, counts: f64) -> f64 {
+        self.fixed.unwrap_or(0.0) + self.distance(counts)
+    }
+
+    /// The way, radians or metres, between two positions so many counts apart.
+    pub fn distance(&self, counts: f64) -> f64 {
         counts / self.counts_per_unit
     }
 
     /// Lowest and highest whole count inside the travel.
     #[allow(clippy::cast_possible_truncation)] // the rig reader checked that both fit
     pub fn count_limits(&self) -> (i32, i32) {
+        if self.fixed.is_some() {
+            return (0, 0);
+        }
         let low = libm::ceil(self.travel.0 * self.counts_per_unit - COUNT_SLACK);
         let high = libm::floor(self.travel.1 * self.counts_per_unit + COUNT_SLACK);
         (low as i32, high as i32)
@@ -140,6 +163,9 @@ impl Axis {
         let axis = self.name;
         let (low, high) = self.count_limits();
         let is_inside = |position: f64| (low..=high).contains(&self.counts(position));
+        if let Some(fixed) = self.fixed.filter(|_| !is_inside(position)) {
+            return Err(LimitError::Fixed { axis, position, fixed });
+        }
         if !is_inside(position) {
             return Err(if position < self.travel.0 {
                 LimitError::Below { axis, position, limit: self.travel.0 }
@@ -190,6 +216,7 @@ mod tests {
         Axis {
             name: AxisName::Theta,
             channel: 0,
+            fixed: None,
             travel: ((-95.0_f64).to_radians(), 95.0_f64.to_radians()),
             speed: 1.0,
             acceleration: 2.0,
@@ -237,6 +264,26 @@ mod tests {
             error.to_string(),
             "theta: -95.000° can only be approached from -95.500°, which is outside the travel \
              from -95.000° to 95.000°"
+        );
+    }
+
+    #[test]
+    fn a_fixed_axis_stands_at_its_count_0_and_nowhere_else() {
+        let at = 90.0_f64.to_radians();
+        let axis = Axis {
+            name: AxisName::Phi,
+            fixed: Some(at),
+            travel: (at, at),
+            counts_per_unit: 1e6,
+            ..theta()
+        };
+        assert_eq!((axis.counts(at), axis.count_limits()), (0, (0, 0)));
+        assert_eq!(axis.position(0.0).to_bits(), at.to_bits());
+        assert_eq!(axis.check(at + 1e-12), Ok(()));
+        let moved = axis.check(0.0).unwrap_err();
+        assert_eq!(
+            moved.to_string(),
+            "phi: 0.000° is asked for, but the rig file has it fixed at 90.000°"
         );
     }
 }

@@ -21,6 +21,9 @@ const BUILT_IN: &str = include_str!("simulated.toml");
 /// Channels are as many as there are axes, so that a move names them all.
 const CHANNEL_MAX: i64 = 3;
 const TRAVEL_MM_MAX: f64 = 10_000.0;
+/// Of an axis that nobody counts: a position within half a micrometre or microradian of where it
+/// stands is that one.
+const FIXED_COUNTS_PER_UNIT: f64 = 1e6;
 const SETTLE_MS_MAX: f64 = 60_000.0;
 /// Gain ranges that a device can number.
 const GAINS_MAX: usize = 64;
@@ -40,14 +43,15 @@ impl Rig {
     pub fn read(document: Document) -> Result<Self, Problem> {
         let root = document.root();
         let name = root.required_text("name")?.to_owned();
-        let axes = read_axes(&root.required_table("axes")?)?;
+        let axes_table = root.required_table("axes")?;
+        let axes = read_axes(&axes_table)?;
         let alignment = root.table("alignment")?.map(read_alignment).transpose()?;
         let alignment = alignment.unwrap_or_default();
         let detector = read_detector(root.required_table("detector")?)?;
         let link = Link::read(root.required_table("link")?)?;
         let is_simulated = matches!(link, Link::Simulated { .. });
         let devices = Devices::read(&root, !is_simulated, detector.gains.len())?;
-        check_devices(&root, &link, devices.as_ref())?;
+        check_devices(&root, &link, devices.as_ref(), &axes)?;
         if is_simulated {
             root.leave("simulated");
         } else if root.has("simulated") {
@@ -68,9 +72,22 @@ impl Rig {
     }
 }
 
-/// Devices and the word for them go together, and each axis is moved by one.
-fn check_devices(root: &Table<'_>, link: &Link, devices: Option<&Devices>) -> Result<(), Problem> {
+/// Devices and the word for them go together, and each axis that is not fixed is moved by one.
+fn check_devices(
+    root: &Table<'_>,
+    link: &Link,
+    devices: Option<&Devices>,
+    axes: &[Axis; 4],
+) -> Result<(), Problem> {
     let Some(devices) = devices else {
+        if let Some(axis) = axes.iter().find(|axis| axis.fixed.is_some()) {
+            return Err(root.problem(
+                "axes",
+                &format!("{} is fixed, on a rig with one controller", axis.name.name()),
+                "a fixed axis only where [[axes_link]] says who moves the others",
+                "describe how the controller moves it, or the devices that move the others",
+            ));
+        }
         return match link {
             Link::Devices => Err(root.missing(
                 "axes_link",
@@ -87,13 +104,24 @@ fn check_devices(root: &Table<'_>, link: &Link, devices: Option<&Devices>) -> Re
             "set link.kind to \"devices\", or remove [[axes_link]] and [photometer]",
         ));
     }
-    match AXES.into_iter().find(|axis| devices.place_of(*axis).is_none()) {
+    let is_moved = |axis: &Axis| devices.place_of(axis.name).is_some();
+    match axes.iter().find(|axis| is_moved(axis) == axis.fixed.is_some()) {
         None => Ok(()),
+        Some(axis) if is_moved(axis) => Err(root.problem(
+            "axes_link",
+            &format!("a device moves {0}, which is fixed in [axes.{0}]", axis.name.name()),
+            "an axis that is moved or fixed, not both",
+            "remove it from the [[axes_link]], or describe how it moves in its table",
+        )),
         Some(axis) => Err(root.problem(
             "axes_link",
-            &format!("no device moves {}", axis.name()),
-            "each of theta, phi, x and y in one [[axes_link]]",
-            "say which device moves it",
+            &format!("no device moves {}", axis.name.name()),
+            "each of theta, phi, x and y in one [[axes_link]], or fixed",
+            &format!(
+                "say which device moves it, or where it stands: fixed_{} in [axes.{}]",
+                axis.name.file_unit(),
+                axis.name.name()
+            ),
         )),
     }
 }
@@ -102,6 +130,9 @@ fn read_axes(table: &Table<'_>) -> Result<[Axis; 4], Problem> {
     let mut channels = HashSet::new();
     let mut read = |name: AxisName| {
         let axis_table = table.required_table(name.name())?;
+        if axis_table.has(&format!("fixed_{}", name.file_unit())) {
+            return read_fixed(name, axis_table);
+        }
         let axis = read_axis(name, &axis_table)?;
         if !channels.insert(axis.channel) {
             return Err(axis_table.problem(
@@ -115,7 +146,50 @@ fn read_axes(table: &Table<'_>) -> Result<[Axis; 4], Problem> {
         Ok(axis)
     };
     let [theta, phi, x, y] = AXES;
-    Ok([read(theta)?, read(phi)?, read(x)?, read(y)?])
+    let mut axes = [read(theta)?, read(phi)?, read(x)?, read(y)?];
+    // What nobody moves takes the channels that are left.
+    let mut left = (0_u8..).take(AXES.len()).filter(|channel| !channels.contains(channel));
+    for axis in axes.iter_mut().filter(|axis| axis.fixed.is_some()) {
+        axis.channel = left.next().unwrap_or_default();
+    }
+    Ok(axes)
+}
+
+/// The keys of an axis that nothing moves: `fixed_UNIT`, where it stands · `u_zero_UNIT`, how well
+/// that is known.
+fn read_fixed(name: AxisName, table: Table<'_>) -> Result<Axis, Problem> {
+    let unit = name.file_unit();
+    let si = |value: f64| if name.is_rotary() { value.to_radians() } else { value / 1e3 };
+    let reach = reach(name);
+    let at = si(table.required_number(&format!("fixed_{unit}"), Bounds::between(-reach, reach))?);
+    let u_zero = si(table.required_number(&format!("u_zero_{unit}"), Bounds::NON_NEGATIVE)?);
+    let moving = ["channel", "readback", "settle_ms"].map(str::to_owned);
+    let moving = moving.into_iter().chain([format!("travel_{unit}"), format!("counts_per_{unit}")]);
+    if let Some(key) = moving.into_iter().find(|key| table.has(key)) {
+        return Err(table.problem(
+            &key,
+            "a key of axes that move, in the table of a fixed one",
+            &format!("fixed_{unit} and u_zero_{unit} alone"),
+            &format!("remove it, or remove fixed_{unit}"),
+        ));
+    }
+    table.finish()?;
+    Ok(Axis {
+        name,
+        channel: 0,
+        fixed: Some(at),
+        travel: (at, at),
+        speed: 1.0,
+        acceleration: 1.0,
+        counts_per_unit: FIXED_COUNTS_PER_UNIT,
+        settle: Duration::ZERO,
+        approach: Approach::Either,
+        run_up: 0.0,
+        readback: Readback::None,
+        u_zero,
+        u_homing: 0.0,
+        u_readback: 0.0,
+    })
 }
 
 /// An axis's keys. `UNIT` is `deg` for theta and phi, `mm` for x and y.
@@ -148,6 +222,7 @@ fn read_axis(name: AxisName, table: &Table<'_>) -> Result<Axis, Problem> {
     Ok(Axis {
         name,
         channel: u8::try_from(channel).unwrap_or_default(),
+        fixed: None,
         travel: (si(travel.0), si(travel.1)),
         speed: si(speed),
         acceleration: si(acceleration),
@@ -162,13 +237,18 @@ fn read_axis(name: AxisName, table: &Table<'_>) -> Result<Axis, Problem> {
     })
 }
 
-fn read_travel(name: AxisName, table: &Table<'_>) -> Result<(f64, f64), Problem> {
-    let key = format!("travel_{}", name.file_unit());
-    let reach = match name {
+/// How far from its zero an axis may stand, in the file's unit.
+const fn reach(name: AxisName) -> f64 {
+    match name {
         AxisName::Theta => 180.0,
         AxisName::Phi => 540.0,
         AxisName::X | AxisName::Y => TRAVEL_MM_MAX,
-    };
+    }
+}
+
+fn read_travel(name: AxisName, table: &Table<'_>) -> Result<(f64, f64), Problem> {
+    let key = format!("travel_{}", name.file_unit());
+    let reach = reach(name);
     let travel = table.required_interval(&key, Bounds::between(-reach, reach))?;
     if travel.0 <= 0.0 && travel.1 >= 0.0 {
         return Ok(travel);

@@ -50,27 +50,38 @@ pub fn solutions(pose: Pose) -> [AxisPositions; 6] {
     ]
 }
 
+/// Every set of positions that looks along `pose` and passes a check; if there is none, why the plain
+/// one does not.
+fn reachable_by(
+    pose: Pose,
+    check: impl Fn(AxisPositions) -> Result<(), LimitError>,
+) -> Result<Vec<AxisPositions>, LimitError> {
+    let mut first_error = None;
+    let mut reachable = Vec::with_capacity(2);
+    for positions in solutions(pose) {
+        match check(positions) {
+            Ok(()) => reachable.push(positions),
+            Err(e) => first_error = first_error.or(Some(e)),
+        }
+    }
+    match first_error {
+        Some(e) if reachable.is_empty() => Err(e),
+        _ => Ok(reachable),
+    }
+}
+
 impl Rig {
     /// Every set of positions that looks along `pose` and is inside the limits, in the order of
     /// [`solutions`]; if there is none, why the plain one is outside.
     pub fn reachable(&self, pose: Pose) -> Result<Vec<AxisPositions>, LimitError> {
-        let mut first_error = None;
-        let mut reachable = Vec::with_capacity(2);
-        for positions in solutions(pose) {
-            match self.check(positions) {
-                Ok(()) => reachable.push(positions),
-                Err(e) => first_error = first_error.or(Some(e)),
-            }
-        }
-        match first_error {
-            Some(e) if reachable.is_empty() => Err(e),
-            _ => Ok(reachable),
-        }
+        reachable_by(pose, |positions| self.check(positions))
     }
 
-    /// The positions that look along `pose` and are quickest to reach from `from`.
+    /// The positions that look along `pose` and are quickest to reach from `from`. An axis that
+    /// stays where it is may stand anywhere: some are homed at switches beyond their travel.
     pub fn nearest(&self, pose: Pose, from: AxisPositions) -> Result<AxisPositions, LimitError> {
-        let reachable = self.reachable(pose)?;
+        let reachable =
+            reachable_by(pose, |positions| self.check_move(self.counts(from), positions))?;
         let time = |positions: &AxisPositions| self.move_time_s(from, *positions);
         let nearest = reachable.iter().copied().min_by(|a, b| time(a).total_cmp(&time(b)));
         // `reachable` is never empty: the fallback is the plain solution.
@@ -80,6 +91,18 @@ impl Rig {
     /// Whether every axis may stand at its position.
     pub fn check(&self, positions: AxisPositions) -> Result<(), LimitError> {
         self.axes.iter().zip(positions.0).try_for_each(|(axis, position)| axis.check(position))
+    }
+
+    /// Where the axes stand at home: at 0, but for those that are fixed elsewhere.
+    pub fn home(&self) -> AxisPositions {
+        self.positions(Latched::ZERO)
+    }
+
+    /// Whether every axis that has to move from there may stand at its position.
+    pub fn check_move(&self, from: Latched, to: AxisPositions) -> Result<(), LimitError> {
+        let moves = self.axes.iter().zip(to.0).zip(from.0);
+        let mut moves = moves.filter(|((axis, to), from)| axis.counts(*to) != *from);
+        moves.try_for_each(|((axis, to), _)| axis.check(to))
     }
 
     /// Positions in whole counts, rounded to the nearest.

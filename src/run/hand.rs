@@ -97,12 +97,10 @@ impl Hand<'_> {
     }
 
     pub(super) async fn jog(&mut self, to: Latched) -> Result<Stand, HandError> {
-        for (axis, counts) in self.hardware.rig.axes.iter().zip(to.0) {
-            axis.check(axis.position(f64::from(counts)))?;
-        }
         let (id, status) = self.begin().await?;
         let rig = self.hardware.rig.clone();
         let from = to_axes(&rig, &status.readback);
+        rig.check_move(from, rig.positions(to))?;
         let way = route(&rig, Some(from), to);
         self.desk.tell(Happening::State(State::Moving));
         let mut moved = Ok(());

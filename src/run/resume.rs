@@ -159,10 +159,7 @@ fn u_rehoming(rig: &Rig, samples: &[Sample], at: AxisPositions) -> f64 {
 fn slopes(rig: &Rig, samples: &[Sample], at: AxisPositions) -> [f64; 4] {
     // An axis counts by its travel, so that metres and radians compare.
     let scaled = |sample: &Sample| -> [f64; 4] {
-        std::array::from_fn(|i| {
-            let (low, high) = rig.axes[i].travel;
-            (sample.positions.0[i] - at.0[i]) / (high - low)
-        })
+        std::array::from_fn(|i| (sample.positions.0[i] - at.0[i]) / span(rig, i))
     };
     let mut near: Vec<([f64; 4], f64)> =
         samples.iter().map(|sample| (scaled(sample), sample.value)).collect();
@@ -173,7 +170,13 @@ fn slopes(rig: &Rig, samples: &[Sample], at: AxisPositions) -> [f64; 4] {
         return [0.0; 4];
     }
     let slopes = plane(&near);
-    std::array::from_fn(|i| slopes[i] / (rig.axes[i].travel.1 - rig.axes[i].travel.0))
+    std::array::from_fn(|i| slopes[i] / span(rig, i))
+}
+
+/// How far an axis goes; a fixed one has no way to compare.
+fn span(rig: &Rig, i: usize) -> f64 {
+    let (low, high) = rig.axes[i].travel;
+    if rig.axes[i].fixed.is_some() { 1.0 } else { high - low }
 }
 
 /// Least squares of value = a + b·offset, by normal equations about the means: b. Directions in

@@ -11,6 +11,7 @@ use crate::{Scene, Shape, Simulated, Terms, compile};
 pub(crate) fn board() -> SimulatedBoard {
     let axis = |channel| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit: 1000.0,
         travel_counts: (-50_000, 50_000),
         speed_counts_per_s: 10_000,

@@ -14,6 +14,7 @@ use crate::{Bench, NominalAxis, Simulated, SimulatedBoard};
 fn board() -> SimulatedBoard {
     let axis = |channel: u8| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit: if channel < 2 { 1000.0_f64.to_degrees() } else { 1e6 },
         travel_counts: (-50_000, 50_000),
         speed_counts_per_s: 100_000,

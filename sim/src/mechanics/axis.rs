@@ -24,6 +24,8 @@ pub(crate) struct AxisTruth {
     name: &'static str,
     seed: u64,
     counts_per_unit: f64,
+    /// The value at count 0 as stated.
+    home: f64,
     /// Where the home mark stands, in counts from where the axis's value is zero.
     mark_counts: f64,
     /// Standard deviation of finding it again.
@@ -84,6 +86,7 @@ impl AxisTruth {
             name,
             seed,
             counts_per_unit: per_unit,
+            home: axis.home,
             mark_counts,
             homing_counts: axis.u_homing * per_unit.abs(),
             lines,
@@ -96,7 +99,12 @@ impl AxisTruth {
                 counts: missed.counts,
                 effect: format!("{name}-{MISSED_STEPS}"),
             }),
-            start_counts: libm::round(low + fraction * (high - low)),
+            // One that can't move can't seek its mark: it was put there.
+            start_counts: if low < high {
+                libm::round(low + fraction * (high - low))
+            } else {
+                mark_counts
+            },
             switch_counts: (mark_counts + low - beyond, mark_counts + high + beyond),
             speed_counts_per_s: f64::from(axis.speed_counts_per_s),
             acceleration_counts_per_s2: f64::from(axis.acceleration_counts_per_s2.max(1)),
@@ -333,7 +341,7 @@ impl Axis {
             None => self.truth.scale_error(mechanical),
             Some(_) => self.truth.periodic_error(mechanical),
         };
-        (mechanical + error) / self.truth.counts_per_unit
+        self.truth.home + (mechanical + error) / self.truth.counts_per_unit
     }
 
     /// Whether it moves at constant speed.

@@ -24,6 +24,7 @@ pub fn exact_rig() -> Nominal {
     let per_rad = COUNTS_PER_DEG * 180.0 / core::f64::consts::PI;
     let axis = |channel, counts_per_unit: f64, travel: i32| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit,
         travel_counts: (-travel, travel),
         speed_counts_per_s: 24_000,

@@ -43,7 +43,8 @@ impl Composer {
                 is_gone: false,
             },
             boot_id,
-            homed: 0,
+            homed: fixed(rig),
+            fixed: fixed(rig),
             here: vec![0; rig.axes.len()],
             queue: VecDeque::new(),
             running: None,
@@ -66,6 +67,12 @@ impl Composer {
         let photometer = photometer_driver(rig, &devices.photometer);
         Some(Self::new(rig, &devices.axes, axes, photometer, boot_id))
     }
+}
+
+/// The channels of axes that nothing moves.
+fn fixed(rig: &Rig) -> u8 {
+    let fixed = rig.axes.iter().filter(|axis| axis.fixed.is_some());
+    fixed.fold(0, |mask, axis| mask | 1 << axis.channel)
 }
 
 fn axes_driver(rig: &Rig, link: &AxesLink) -> Box<dyn Axes> {

@@ -47,6 +47,8 @@ pub struct Composer {
     boot_id: u32,
     // Channels that were homed since their device booted.
     homed: u8,
+    // Channels that nothing moves: they stand at their count 0.
+    fixed: u8,
     // Where the axes were last seen, counts by channel.
     here: Vec<i32>,
     queue: VecDeque<Command>,

@@ -45,7 +45,7 @@ impl Composer {
         }
         match command {
             Command::Home(home) => {
-                let all = self.parts.iter().fold(0, |mask, part| mask | part.mask());
+                let all = self.parts.iter().fold(self.fixed, |mask, part| mask | part.mask());
                 let is_some = home.axes.0 != 0 && home.axes.0 & !all == 0;
                 if is_some { Ok(()) } else { Err(Rejection::Senseless) }
             }
@@ -57,6 +57,11 @@ impl Composer {
     fn admit_move(&self, to: &MoveTo) -> Result<(), Rejection> {
         if to.targets.0.len() != self.here.len() {
             return Err(Rejection::Senseless);
+        }
+        let is_fixed = |channel: usize| self.fixed & (1 << channel) != 0;
+        let mut targets = to.targets.0.iter().enumerate();
+        if let Some((n, to)) = targets.find(|(channel, to)| is_fixed(*channel) && **to != 0) {
+            return Err(Rejection::OutsideLimits(u8::try_from(n).unwrap_or(u8::MAX), *to));
         }
         let will_home = self.queue.iter().any(|command| matches!(command, Command::Home(_)));
         for part in &self.parts {

@@ -26,6 +26,7 @@ const TOLERANCE: u32 = 12;
 fn board() -> SimulatedBoard {
     let axis = |channel| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit: 4096.0 / std::f64::consts::TAU,
         travel_counts: (-2000, 2000),
         speed_counts_per_s: SPEED,

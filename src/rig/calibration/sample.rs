@@ -245,6 +245,6 @@ fn moved(rig: &Rig, reading: &Reading) -> bool {
     let ends = reading.start.0.iter().zip(&reading.travel.0).zip(reading.end.0);
     rig.axes.iter().zip(ends).any(|(axis, ((start, travel), end))| {
         let counts = end.abs_diff(start.saturating_add(*travel));
-        counts > MOVED_COUNTS && axis.position(f64::from(counts)) > MOVED_U * axis.u_readback
+        counts > MOVED_COUNTS && axis.distance(f64::from(counts)) > MOVED_U * axis.u_readback
     })
 }

@@ -102,7 +102,7 @@ pub(super) fn scans(terms: &Terms, steps: &[Step], calibrated: &Calibrated) -> V
 fn seconds_per_rad(terms: &Terms, window: Duration, travel: Latched) -> f64 {
     let adc = terms.rig.detector.adc;
     let window_s = f64::from(adc.readings_in(window)) / f64::from(adc.rate_hz);
-    window_s / terms.rig.axes[0].position(f64::from(travel.0[0])).abs()
+    window_s / terms.rig.axes[0].distance(f64::from(travel.0[0])).abs()
 }
 
 impl Scan {

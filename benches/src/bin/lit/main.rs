@@ -213,6 +213,7 @@ fn section(path: &std::path::Path) -> Result<Section, Unmeasured> {
 fn nominal() -> Nominal {
     let axis = |channel| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit: 20_000.0,
         travel_counts: (-72_000, 72_000),
         speed_counts_per_s: 24_000,

@@ -167,6 +167,7 @@ fn rig() -> Nominal {
     const COUNTS_PER_RAD: f64 = 400.0 * 180.0 / core::f64::consts::PI;
     let axis = |channel, counts_per_unit: f64, travel: i32| NominalAxis {
         channel,
+        home: 0.0,
         counts_per_unit,
         travel_counts: (-travel, travel),
         speed_counts_per_s: 24_000,

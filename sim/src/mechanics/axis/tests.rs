@@ -14,6 +14,7 @@ const NONE: AxisFlaws = AxisFlaws {
 fn axis() -> NominalAxis {
     NominalAxis {
         channel: 0,
+        home: 0.0,
         counts_per_unit: 1000.0,
         travel_counts: (-1000, 1000),
         speed_counts_per_s: 500,
