@@ -98,6 +98,25 @@ fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
 }
 
 #[test]
+fn the_basis_of_a_long_file_is_chosen_from_some_of_its_sweeps() {
+    let bench = Bench::empty();
+    let text = samples(0, 60_000, true);
+    std::fs::write(bench.path("long.csv"), &text).unwrap();
+    let whole = bench.gonio(&["fit", "long.csv", "--json"]).well().json();
+    let chosen = &whole["choice"];
+    let readings = chosen["n_readings"].as_u64().unwrap();
+    assert!((100..=6000).contains(&readings), "{chosen}");
+    assert_eq!(whole["n_used"], 60_000);
+    assert!(whole["notes"][2].as_str().unwrap().contains("by the choice"), "{}", whole["notes"]);
+    // A wrong sample is named by its line, were it left out of the choice or not.
+    let mut lines: Vec<&str> = text.lines().collect();
+    let wrong = lines[777].replacen(lines[777].split(',').nth(2).unwrap(), "95.5", 1);
+    lines[777] = &wrong;
+    std::fs::write(bench.path("wrong.csv"), lines.join("\n")).unwrap();
+    bench.gonio(&["fit", "wrong.csv"]).refused(&["line 778", "95.5", "help: "]);
+}
+
+#[test]
 fn a_share_is_looked_at_once_and_refuses_what_takes_more() {
     let bench = bench();
     for (flags, said) in [

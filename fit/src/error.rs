@@ -186,6 +186,21 @@ pub enum FitError {
     },
 }
 
+impl FitError {
+    /// The sample that is wrong, where it is one.
+    pub fn index(&self) -> Option<usize> {
+        match *self {
+            Self::NotFinite { index, .. }
+            | Self::Variance { index, .. }
+            | Self::ShotNoise { index, .. }
+            | Self::Theta { index, .. }
+            | Self::OutsideRegion { index, .. }
+            | Self::OutsideSecondPlane { index, .. } => Some(index),
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for FitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -46,7 +46,7 @@ pub use basis::{Angular, BasisSpec, Fine, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
 pub use chart::{Chart, Face};
-pub use choice::{AngularKind, Candidate, Choice, SweepKind, Wish, choose};
+pub use choice::{AngularKind, Candidate, Choice, Gleaning, SweepKind, Wish, choose};
 pub use coverage::Coverage;
 pub use error::FitError;
 pub use fitted::{Contribution, Estimate, Fit, TRUNCATION};

@@ -4,9 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{
-    AngularKind, Optics, Penalised, Readings, Region, Resolves, Robust, Rules, Symmetry, Wish,
-};
+use fit::{AngularKind, Optics, Readings, Region, Resolves, Robust, Rules, Symmetry, Wish};
 
 use super::args::FitArgs;
 use super::derive;
@@ -249,9 +247,9 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         && args.picture.is_none()
         && args.u_scale.is_none()
         && dice.is_none()
-        && let Some(model) = scan.pinned(&wish)
+        && scan.is_for_blocks(&wish)
     {
-        return fit_stream(args, rays, wanted, (&scan, model, optics, &wish.rules));
+        return fit_stream(args, rays, wanted, (&scan, optics, &wish));
     }
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
     let input = kept.map_or_else(|| stream::all(&args.source, chart), Ok)?;
@@ -311,22 +309,28 @@ fn scale_of(args: &FitArgs) -> Result<Vec<fit::Common>, Failure> {
     Ok(vec![fit::Common { name: "scale".to_owned(), u, shift: fit::Shift::Scale }])
 }
 
-/// A long file in a basis that is pinned.
+/// A long file, in blocks.
 fn fit_stream(
     args: &FitArgs,
     rays: Option<Vec<ListedRay>>,
     wanted: &[Wanted],
-    (scan, model, optics, rules): (&Scan, Penalised, Option<Optics>, &Rules),
+    (scan, optics, wish): (&Scan, Option<Optics>, &Wish),
 ) -> Outcome {
+    let (model, choice) = scan.model(&args.source, wish, optics.as_ref())?;
     let closed = scan.fit(&args.source, model, optics, args.u_relative)?;
-    let ruled = closed.fit.ruled(rules).map_err(|error| {
+    let ruled = closed.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
+    let truncation = if choice.is_some() {
+        "u of the radiance alone has a part for what the basis can't follow (truncation), by the choice: \
+         that of integrals takes all samples at once"
+    } else {
+        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
+    };
     let notes = [
         note_on_u(scan.has_u, args.u_relative),
         "read in blocks, no sample kept: what single ones did is not listed".to_owned(),
-        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
-            .to_owned(),
+        truncation.to_owned(),
     ];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment =
@@ -334,7 +338,7 @@ fn fit_stream(
     let file = FitFile {
         fit: &ruled.fit,
         treatment: &treatment,
-        choice: None,
+        choice: choice.as_ref(),
         resolves: None,
         quantity: scan.quantity,
         simulated: false,

@@ -1,12 +1,13 @@
-//! `gonio fit` of a long CSV in a basis that is pinned: the file is read again and again, in blocks, and no
-//! sample is kept. Memory is that of the coefficients' triangle and of a block.
+//! `gonio fit` of a long CSV: the file is read again and again, in blocks. Where no basis is pinned it is
+//! chosen from whole sweeps that a first look keeps, a bounded number of samples. Memory is that of those,
+//! of the coefficients' triangle and of a block.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use fit::partial::{Closed, Pass, Passes, Weighting};
-use fit::{Optics, Penalised, Ray, Region, Robust, Wish};
+use fit::{Choice, Gleaning, Optics, Penalised, Ray, Region, Robust, Wish};
 
 use super::args::ChartArgs;
 use super::chart::csv_help;
@@ -27,6 +28,7 @@ pub(super) struct Scan {
     pub(super) has_u: bool,
     has_limits: bool,
     is_surface: bool,
+    gleaning: Gleaning,
 }
 
 impl Scan {
@@ -72,9 +74,10 @@ impl Scan {
             *y_m = (y_m.0.min(ray.y_m), y_m.1.max(ray.y_m));
             *theta_max_rad = theta_max_rad.max(ray.theta_rad);
         }
-        let used = block.fit_samples_with_lines().0.len();
-        self.used += used;
-        self.has_limits |= block.with_limits().count() > used;
+        let (used, _) = block.fit_samples_with_lines();
+        self.used += used.len();
+        self.has_limits |= block.with_limits().count() > used.len();
+        self.gleaning.take(&used);
     }
 
     fn none(quantity: Quantity) -> Self {
@@ -87,13 +90,32 @@ impl Scan {
             has_u: false,
             has_limits: false,
             is_surface: false,
+            gleaning: Gleaning::new(KEPT_MAX),
         }
     }
 
-    /// The basis, where the file is long and what is asked for needs no more than passes over it.
-    pub(super) fn pinned(&self, wish: &Wish) -> Option<Penalised> {
+    /// Whether the file is long and what is asked for needs no more than passes over it.
+    pub(super) fn is_for_blocks(&self, wish: &Wish) -> bool {
         let is_plain = wish.rules.robust == Robust::None && !self.has_limits && self.is_surface;
-        (self.samples > KEPT_MAX && is_plain).then(|| wish.decided()).flatten()
+        self.samples > KEPT_MAX && is_plain
+    }
+
+    /// The basis that is pinned, or that the sweeps which were kept ask for.
+    pub(super) fn model(
+        &self,
+        path: &Path,
+        wish: &Wish,
+        optics: Option<&Optics>,
+    ) -> Result<(Penalised, Option<Choice>), Failure> {
+        let samples = self.gleaning.clone().into_samples();
+        fit::choose(&samples, &self.region, wish, optics).map_err(|error| {
+            // Whose sample is wrong is known by its line to a pass over the file alone.
+            let flat = fit::BasisSpec::zernike(0, 0).into();
+            let by_line = error.index().and_then(|_| self.fit(path, flat, None, None).err());
+            by_line.unwrap_or_else(|| {
+                Failure::with_help(format!("{}: {error}", path.display()), FIT_HELP)
+            })
+        })
     }
 
     /// The fit, in as many passes as it takes.
@@ -176,7 +198,7 @@ fn error_help<E>(error: &BlockError<E>, chart: RayChart) -> String {
 
 /// Before anything lies anywhere.
 const NOWHERE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
-/// Fewer samples than this are kept rather than read again: some 10 MB.
+/// Fewer samples than this are kept rather than read again, and of more this many at most: some 10 MB.
 const KEPT_MAX: usize = 50_000;
 /// The excess settles in fewer.
 const PASSES_MAX: usize = 40;

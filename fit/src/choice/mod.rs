@@ -8,6 +8,7 @@
 
 mod evidence;
 mod family;
+mod gleaning;
 mod search;
 mod sweeps;
 
@@ -20,6 +21,7 @@ use crate::{
 use family::{Strengths, Trial};
 use search::Search;
 
+pub use gleaning::Gleaning;
 pub use sweeps::SweepKind;
 pub(crate) use sweeps::Sweeps;
 

@@ -118,17 +118,10 @@ pub enum PartialError {
 impl PartialError {
     /// The sample that is to blame, from 0, where one is.
     pub fn index(&self) -> Option<usize> {
-        match *self {
-            Self::Noise { index }
-            | Self::Fit(
-                FitError::NotFinite { index, .. }
-                | FitError::Variance { index, .. }
-                | FitError::ShotNoise { index, .. }
-                | FitError::Theta { index, .. }
-                | FitError::OutsideRegion { index, .. }
-                | FitError::OutsideSecondPlane { index, .. },
-            ) => Some(index),
-            Self::Fit(_) | Self::Differ { .. } => None,
+        match self {
+            Self::Noise { index } => Some(*index),
+            Self::Fit(error) => error.index(),
+            Self::Differ { .. } => None,
         }
     }
 }
