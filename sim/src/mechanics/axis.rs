@@ -9,7 +9,7 @@ use core::time::Duration;
 
 use firmware_protocol::Instant;
 
-use super::flaws::{AxisFlaws, ENCODER_ERROR, MISSED_STEPS};
+use super::flaws::{AxisFlaws, ENCODER_ERROR, LATCH_JITTER, MISSED_STEPS};
 use super::play::Play;
 use super::ringing::Rings;
 use super::scale::{Lines, Periodic};
@@ -36,6 +36,8 @@ pub(crate) struct AxisTruth {
     rings: Option<Rings>,
     play: Option<Play>,
     misses: Option<Misses>,
+    /// By how much the moments of latches in flight scatter, seconds.
+    latch_jitter_s: f64,
     /// Where it stands at boot, counts.
     start_counts: f64,
     /// Where the limit switches stand, counts.
@@ -99,6 +101,7 @@ impl AxisTruth {
                 counts: missed.counts,
                 effect: format!("{name}-{MISSED_STEPS}"),
             }),
+            latch_jitter_s: flaws.jitter_s(),
             // One that can't move can't seek its mark: it was put there.
             start_counts: if low < high {
                 libm::round(low + fraction * (high - low))
@@ -128,6 +131,20 @@ impl AxisTruth {
 
     fn periodic_error(&self, mechanical_counts: f64) -> f64 {
         self.periodic.as_ref().map_or(0.0, |sine| sine.error_counts(mechanical_counts))
+    }
+
+    /// How late an encoder is latched, by where the setpoint is and which way it goes: the end of one
+    /// window and the beginning of the next are one latch, and a sweep that is flown again after an
+    /// interruption has the same ones.
+    #[allow(clippy::cast_possible_truncation)] // saturates beyond any axis
+    fn late_s(&self, cruise: &Cruise, now: Instant) -> f64 {
+        if self.latch_jitter_s <= 0.0 {
+            return 0.0;
+        }
+        let effect = format!("{}-{LATCH_JITTER}", self.name);
+        let meant = libm::round(cruise.setpoint(now, 0.0)) as i64;
+        let key = meant.wrapping_mul(2) + i64::from(cruise.counts_per_s < 0.0);
+        self.latch_jitter_s * draw(self.seed, &effect, key.cast_unsigned())
     }
 
     /// What the n-th move since boot loses, counts: by its number, so that it does not depend on
@@ -323,7 +340,9 @@ impl Axis {
         if !has_encoder {
             return libm::round(self.setpoint_counts) as i32;
         }
-        let position = self.position(now, 0.0);
+        // Where nothing moves it does not matter when.
+        let late_s = self.cruise.map_or(0.0, |cruise| self.truth.late_s(&cruise, now));
+        let position = self.position(now, late_s);
         let lines = self.cruise.and(self.truth.lines.as_ref());
         let error = lines.map_or(0.0, |lines| lines.error_counts(self.origin_counts + position));
         libm::round(position - error) as i32

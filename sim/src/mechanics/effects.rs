@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use super::flaws::{
-    AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, MISSED_STEPS, MOTION_SMEAR, MissedSteps,
-    NON_ORTHOGONALITY, Ringing, SETTLE_RINGING, SETTLING, WOBBLE,
+    AXIS_OFFSET, AxisFlaws, BACKLASH, ENCODER_ERROR, LATCH_JITTER, MISSED_STEPS, MOTION_SMEAR,
+    MissedSteps, NON_ORTHOGONALITY, Ringing, SETTLE_RINGING, SETTLING, WOBBLE,
 };
 use super::geometry::{Kinematics, Misaligned, Perfect};
 use super::ringing::Rings;
@@ -112,6 +112,7 @@ impl Weighing<'_> {
     fn of_axis(&self, i: usize) -> Vec<Candidate> {
         let mut candidates = self.as_stated(i);
         candidates.extend(self.flaws(i));
+        candidates.extend(self.latch(i));
         candidates
     }
 
@@ -205,6 +206,26 @@ impl Weighing<'_> {
                 "a move falls short with a probability, drawn by its number since boot",
             ),
         ]
+    }
+
+    /// Of an axis with an encoder, where readings are taken while it moves.
+    fn latch(&self, i: usize) -> Option<Candidate> {
+        let (name, speed) = (AXIS_NAMES[i], self.setting.terms.sweep[i]);
+        if speed <= 0.0 || !self.setting.nominal.axes[i].has_encoder {
+            return None;
+        }
+        let jitter_s = self.setting.simulated.axes[i].jitter_s();
+        let (_, key, per_key) = units(i);
+        let off = speed * jitter_s;
+        let cause = format!(
+            "simulated.{name}.latch_jitter_us = {}, {:.3} {key}/s",
+            jitter_s * 1e6,
+            speed * per_key
+        );
+        let influence = if off > 0.0 { self.off(i, off) } else { Influence::Relative(0.0) };
+        let how = "each latch in flight is early or late, drawn for its place by the seed";
+        let name = format!("{name}-{LATCH_JITTER}");
+        Some(Candidate::of_key(name, &cause, off > 0.0, influence, how))
     }
 
     /// Root mean square of what is lost by the end of the run if every loss goes the same way,

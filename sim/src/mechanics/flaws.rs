@@ -48,6 +48,9 @@ pub struct AxisFlaws {
     /// How long it takes to come to rest, seconds, at least 0. `None`: as long as the rig file
     /// states.
     pub settle_s: Option<f64>,
+    /// By how much the moments at which an encoder is latched in flight scatter, seconds: a standard
+    /// deviation, at least 0. `None`: as a latch does, [`LATCH_JITTER_S`].
+    pub latch_jitter_s: Option<f64>,
 }
 
 /// A sine in the position: the eccentricity of a graduated circle, the pitch of a screw, the
@@ -88,6 +91,9 @@ const FREQUENCY_HZ_MAX: f64 = 1e4;
 /// An oscillation that is damped less outlasts any dwell.
 const DAMPING: (f64, f64) = (1e-4, 0.999);
 const COUNTS_MAX: f64 = 1e6;
+/// Of an encoder that an interrupt reads: the time that it waits for another one to end.
+pub(super) const LATCH_JITTER_S: f64 = 3e-6;
+const LATCH_JITTER_US_MAX: f64 = 1e5;
 /// As long as a rig file may state.
 const SETTLE_MS_MAX: f64 = 60_000.0;
 
@@ -100,6 +106,7 @@ pub(super) const ENCODER_ERROR: &str = "encoder-error";
 pub(super) const SETTLING: &str = "settling";
 pub(super) const SETTLE_RINGING: &str = "settle-ringing";
 pub(super) const MISSED_STEPS: &str = "missed-steps";
+pub(super) const LATCH_JITTER: &str = "latch-jitter";
 pub(super) const MOTION_SMEAR: &str = "motion-smear";
 
 impl Uncertain {
@@ -210,7 +217,9 @@ impl AxisFlaws {
         let backlash = table.number(&key("backlash"), error)?.unwrap_or(0.0) * per_unit;
         let settle_ms = table.number("settle_ms", Bounds::between(0.0, SETTLE_MS_MAX))?;
         let settle_s = settle_ms.map(|ms| ms / 1e3);
-        let mut read = Self { backlash, settle_s, ..Self::default() };
+        let jitter = Bounds::between(0.0, LATCH_JITTER_US_MAX);
+        let latch_jitter_s = table.number("latch_jitter_us", jitter)?.map(|us| us / 1e6);
+        let mut read = Self { backlash, settle_s, latch_jitter_s, ..Self::default() };
         if let Some(error_table) = table.table("encoder_error")? {
             let period = Bounds::positive_up_to(PERIOD_MAX);
             read.encoder_error = Some(EncoderError {
@@ -253,7 +262,13 @@ impl AxisFlaws {
         self.ringing = self.ringing.filter(|_| is_in(SETTLE_RINGING));
         self.missed_steps = self.missed_steps.filter(|_| is_in(MISSED_STEPS));
         self.settle_s = self.settle_s.filter(|_| is_in(SETTLING));
+        self.latch_jitter_s = Some(if is_in(LATCH_JITTER) { self.jitter_s() } else { 0.0 });
         self
+    }
+
+    /// By how much the moments of latches scatter, stated or not.
+    pub(super) fn jitter_s(&self) -> f64 {
+        self.latch_jitter_s.unwrap_or(LATCH_JITTER_S)
     }
 }
 

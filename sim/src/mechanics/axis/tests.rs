@@ -9,6 +9,7 @@ const NONE: AxisFlaws = AxisFlaws {
     ringing: None,
     missed_steps: None,
     settle_s: None,
+    latch_jitter_s: Some(0.0),
 };
 
 fn axis() -> NominalAxis {
@@ -167,4 +168,31 @@ fn the_periodic_error_of_a_scale_is_in_the_position_and_not_in_the_readback() {
         assert_eq!(axis.readback(now, true), counts);
     }
     assert!((0.0019..=0.002).contains(&largest), "{largest}");
+}
+
+#[test]
+fn in_flight_an_encoder_is_latched_a_little_early_or_late_and_at_rest_it_does_not_matter() {
+    let jitter_s = 1e-3;
+    let latch = |jitter_s: f64| {
+        let mut axis = homed(&AxisFlaws { latch_jitter_s: Some(jitter_s), ..NONE }, 1.0);
+        let began = at(1000);
+        axis.begin_cruise(began, 400.0, 0.1);
+        let read = |ms: u64, axis: &mut Axis| {
+            let now = at(1000 + ms);
+            axis.set_setpoint(now, 400.0 * seconds(now.since(began)));
+            (f64::from(axis.readback(now, true)), axis.setpoint_counts())
+        };
+        // Whatever the start excites is over by then.
+        (500..1500).map(|ms| read(ms, &mut axis)).map(|(found, meant)| found - meant).collect()
+    };
+    let rms = |errors: &[f64]| {
+        libm::sqrt(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64)
+    };
+    let (late, exact): (Vec<f64>, Vec<f64>) = (latch(jitter_s), latch(0.0));
+    // Rounding to whole counts, and 400 counts a second times a millisecond beside it.
+    assert!(exact.iter().all(|error| error.abs() <= 0.5 + 1e-9), "{exact:?}");
+    let more = libm::sqrt(rms(&late).powi(2) - rms(&exact).powi(2));
+    assert!((0.3..0.55).contains(&more), "{more}");
+    let mean = late.iter().sum::<f64>() / late.len() as f64;
+    assert!(mean.abs() < 0.1, "{mean}");
 }
