@@ -44,7 +44,7 @@ impl<'p> Builder<'p> {
 
     /// A dark reading and a reference one; the targets, with more of both between; a reference
     /// reading and a dark one. Every other repeat runs backwards, which saves the way back.
-    pub(super) fn fill(&mut self, targets: &[Target], visits: &[Visit]) {
+    pub(super) fn fill(&mut self, targets: &[Target], visits: &[Visit], dwells: &[Duration]) {
         self.dark();
         self.reference();
         let last = visits.len() as u64 * u64::from(self.plan.repeat);
@@ -52,7 +52,8 @@ impl<'p> Builder<'p> {
         for repeat in 0..self.plan.repeat {
             for place in 0..visits.len() {
                 let place = if repeat % 2 == 0 { place } else { visits.len() - 1 - place };
-                self.target(&targets[visits[place].target as usize], repeat);
+                let index = visits[place].target as usize;
+                self.target(&targets[index], repeat, dwells[index]);
                 visited += 1;
                 if visited % u64::from(self.plan.reference.every) == 0 || visited == last {
                     self.reference();
@@ -122,12 +123,12 @@ impl<'p> Builder<'p> {
         }
     }
 
-    fn target(&mut self, target: &Target, repeat: u32) {
+    fn target(&mut self, target: &Target, repeat: u32, dwell: Duration) {
         let positions = target.positions;
         let counts = self.rig.counts(positions);
         let place = Place { pose: Some(target.pose), positions, counts };
         let kind = ReadingKind::Target { index: target.index, repeat };
-        self.push(kind, place, self.plan.dwell);
+        self.push(kind, place, dwell);
     }
 
     fn reference(&mut self) {

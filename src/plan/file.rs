@@ -10,7 +10,7 @@ use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
 use super::{
-    Adaptive, Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop,
+    Adaptive, Allocation, Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop,
     TARGETS_MAX, Wanted, WarmUp,
 };
 use crate::rig::Pose;
@@ -67,7 +67,8 @@ impl Plan {
         let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
         let (schedule, order, repeat, window) =
             read_schedule(root.required_table("schedule")?, &expect)?;
-        let (dwell, gain) = read_dwell(root.required_table("dwell")?)?;
+        let is_flown = matches!(schedule, Schedule::Sweep { .. } | Schedule::Adaptive(_));
+        let (dwell, allocation, gain) = read_dwell(root.required_table("dwell")?, is_flown)?;
         let dwell = window.unwrap_or(dwell);
         // Rounds close with both whatever comes between: a sweep alone has a hundred windows.
         let is_adaptive = matches!(schedule, Schedule::Adaptive(_));
@@ -93,6 +94,7 @@ impl Plan {
             order,
             repeat,
             dwell,
+            allocation,
             gain,
             dark,
             reference,
@@ -304,12 +306,25 @@ pub(super) fn read_turn_step(table: &Table<'_>, key: &str) -> Result<f64, Proble
 }
 
 /// `[dwell]`: `dwell_ms`; `gain`, a gain range's name (default: the rig's first), or "expected"
-/// for the one that suits the level in `[expect]`.
-fn read_dwell(table: Table<'_>) -> Result<(Duration, Option<String>), Problem> {
+/// for the one that suits the level in `[expect]`; `allocation`, how the dwells of targets at rest
+/// differ, `dwell_ms` their mean: "even" (default), "total" or "each", see [`Allocation`].
+fn read_dwell(
+    table: Table<'_>,
+    is_flown: bool,
+) -> Result<(Duration, Allocation, Option<String>), Problem> {
     let dwell = millis(table.required_number("dwell_ms", DWELL_MS)?);
+    let allocation = table.choice("allocation", &Allocation::WORDS)?.unwrap_or_default();
+    if is_flown && allocation != Allocation::Even {
+        return Err(table.problem(
+            "allocation",
+            "windows of a sweep follow one another at its speed",
+            "targets at rest",
+            "leave the key out; where readings decide, sweeps are as slow as their noise asks",
+        ));
+    }
     let gain = table.text("gain")?.map(str::to_owned);
     table.finish()?;
-    Ok((dwell, gain))
+    Ok((dwell, allocation, gain))
 }
 
 /// `[dark]`: `method` shutter or source-off (which asks a person); `every` so many targets

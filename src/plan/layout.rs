@@ -50,8 +50,9 @@ impl Plan {
             Order::Travel => order::travelling(rig, &candidates, reference.positions),
         };
         let targets = targets(&poses.poses, &visits);
+        let dwells = self.dwells(rig, gain, &targets)?;
         let mut builder = Builder::new(self, rig, gain, reference);
-        builder.fill(&targets, &visits);
+        builder.fill(&targets, &visits, &dwells);
         let prediction = Prediction::of(rig, &targets, &builder.steps);
         let (steps, reference) = (builder.steps, builder.reference);
         let reference = step(0, ReadingKind::Reference, reference, gain, self.reference.dwell);

@@ -8,6 +8,7 @@
 mod adaptive;
 #[cfg(test)]
 mod adaptive_tests;
+mod allocation;
 mod bound;
 mod builder;
 mod cost;
@@ -38,6 +39,7 @@ mod tree;
 mod wanted;
 
 pub use adaptive::{Adaptive, SWEEPS_MAX};
+pub use allocation::Allocation;
 pub use bound::Way;
 pub use cost::{Prediction, StepTime, TimeLeft, time_of};
 pub use expect::Expect;

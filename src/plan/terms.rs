@@ -7,7 +7,7 @@ use std::time::Duration;
 use fit::{Outline, Wish};
 use spanned_toml::Document;
 
-use super::{Adaptive, Expect, Wanted};
+use super::{Adaptive, Allocation, Expect, Wanted};
 use crate::rig::Pose;
 
 /// A plan as its file states it.
@@ -31,6 +31,8 @@ pub struct Plan {
     pub repeat: u32,
     /// `dwell.dwell_ms`: the integration at a target.
     pub dwell: Duration,
+    /// `dwell.allocation`: how the targets' dwells differ from it.
+    pub allocation: Allocation,
     /// `dwell.gain`: a gain range's name, or "expected"; the rig's first if absent.
     pub gain: Option<String>,
     /// `[dark]`.

@@ -105,6 +105,7 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
     ];
     let mut changes: Vec<Change> =
         gone.into_iter().map(|key| Change::remove("schedule", key)).collect();
+    changes.push(Change::remove("dwell", "allocation"));
     changes.push(Change::set("schedule", "kind", "\"sweep\""));
     changes.push(Change::set("schedule", "x_count", places.0));
     changes.push(Change::set("schedule", "y_count", places.1));
@@ -144,6 +145,7 @@ fn adaptive(plan: &Plan) -> Option<Vec<Change>> {
     .map(|key| Change::remove("schedule", key))
     .collect();
     changes.push(Change::remove("stop", "exitance_relative"));
+    changes.push(Change::remove("dwell", "allocation"));
     // Plain least squares of a given degree wants a grid as fine as that everywhere.
     changes.push(Change::remove("fit", "angular_degree"));
     changes.push(Change::set("schedule", "kind", "\"adaptive\""));

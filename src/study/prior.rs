@@ -47,9 +47,7 @@ impl Prior {
         let declared = plan.expect.level.map(|(_, level)| level);
         let level =
             declared.unwrap_or_else(|| LEVEL_ASSUMED * rig.detector.saturation_radiance(gain));
-        let half = |angle: f64| libm::log(0.5) / libm::log(libm::cos(0.5 * angle));
-        let exponent = plan.expect.beam_angle_rad.map_or(0.0, half);
-        Self { level, is_declared: declared.is_some(), exponent }
+        Self { level, is_declared: declared.is_some(), exponent: plan.expect.exponent() }
     }
 
     /// The radiance in a direction.

@@ -13,7 +13,7 @@ use spanned_toml::{Problem, Source};
 
 use super::ladder::spacing;
 use super::{Demand, Forecast, ForecastError, Motion, Rung, Shortfall};
-use crate::plan::{Change, Plan, Schedule};
+use crate::plan::{Allocation, Change, Plan, Schedule};
 use crate::rig::Rig;
 
 /// Factors on the number of targets.
@@ -122,6 +122,7 @@ impl Search<'_> {
             found.considered.push(self.considered(&candidate, meets));
             if meets {
                 if found.best.as_ref().is_none_or(|best| candidate.time_s < best.time_s) {
+                    variants.extend(self.with_dwells_where_they_count(&variant));
                     found.best = Some(candidate);
                 }
                 continue;
@@ -222,6 +223,23 @@ impl Search<'_> {
             (format!("quadrature {theta_count} x {phi_count}, degree {degree}"), changes)
         };
         QUADRATURE_DEGREES.into_iter().map(of).collect()
+    }
+
+    /// The variant with dwells that follow what is expected, where the plan says that and leaves them
+    /// alike, and rests at its targets.
+    fn with_dwells_where_they_count(&self, variant: &Variant) -> Option<Variant> {
+        let is_shaped =
+            self.plan.expect.level.is_some() && self.plan.expect.beam_angle_rad.is_some();
+        let is_done = variant.changes.iter().any(|change| change.key == "allocation");
+        let (plan, _) = self.with(&variant.changes, self.dwell_ms_min())?;
+        let is_open =
+            plan.allocation == Allocation::Even && Motion::of(&plan.schedule) == Motion::StopAndGo;
+        if !is_shaped || is_done || !is_open {
+            return None;
+        }
+        let mut changes = variant.changes.clone();
+        changes.push(Change::set("dwell", "allocation", "\"total\""));
+        self.variant(format!("{}, dwells by what is expected", variant.what), changes)
     }
 
     /// The variant with longer dark readings, where it misses by the dark level most.
