@@ -98,9 +98,12 @@ fn order(setup: &Setup) -> Option<Vec<String>> {
     Some(row(
         "order",
         format!(
-            "{} of moving and settling through the targets; no order takes less than {}: at most {} \
-             above",
+            "{} of {}; no order takes less than {}: at most {} above",
             duration(way.seconds),
+            match setup.sequence.sweeps() {
+                0 => "moving and settling through the targets",
+                _ => "moving from sweep to sweep",
+            },
             duration(way.least_s),
             percent(way.gap()),
         ),

@@ -8,7 +8,7 @@
 
 use super::tree::MoveTime;
 use super::{Plan, Sequence, Step};
-use crate::rig::{AxisPositions, ReadingKind, Rig};
+use crate::rig::{Approach, AxisPositions, ReadingKind, Rig, comes_to_rest, set_out};
 
 /// With more places than this the table of times takes too much memory.
 const PLACES_MAX: usize = 2_000;
@@ -16,10 +16,11 @@ const PLACES_MAX: usize = 2_000;
 const WORK_MAX: usize = 10_000_000;
 const ROUNDS: (usize, usize) = (10, 150);
 
-/// A way through all targets, from the reference pose and back to it, each once.
+/// A way through all targets or all sweeps, from the reference pose and back to it, each once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Way {
-    /// What it takes to move and to settle in the plan's order, seconds.
+    /// What it takes to move and to settle in the plan's order, seconds; of sweeps to move from where
+    /// one comes to rest to where the next sets out.
     pub seconds: f64,
     /// What any order takes at least.
     pub least_s: f64,
@@ -33,10 +34,12 @@ impl Way {
 }
 
 impl Plan {
-    /// The way of a sequence of this plan whose axes rest at its targets, without the readings of the
-    /// reference pose in between. `None` of sweeps, of fewer than three targets, and of more than
-    /// 1999.
+    /// The way of a sequence of this plan, without the readings of the reference pose in between. `None`
+    /// of fewer than three targets, or sweeps, of more than 1999, and of sweeps that are taken at rest.
     pub fn way(&self, rig: &Rig, sequence: &Sequence) -> Option<Way> {
+        if sequence.sweeps() > 0 {
+            return way_of_sweeps(rig, sequence);
+        }
         let is_visit = |step: &&Step| {
             step.swept.is_none() && matches!(step.kind, ReadingKind::Target { repeat: 0, .. })
         };
@@ -55,6 +58,44 @@ impl Plan {
         places.extend(visits.iter().map(seen_from).collect::<Option<Vec<_>>>()?);
         Some(Way { seconds, least_s: Bound::new(time, &places).raised(seconds) })
     }
+}
+
+/// A sweep is a place that is reached at one of its ends and left at either: whichever way it is flown,
+/// nothing is quicker between two of them than between the nearest of their ends.
+fn way_of_sweeps(rig: &Rig, sequence: &Sequence) -> Option<Way> {
+    if rig.takes_sweeps_at_rest() {
+        return None;
+    }
+    let is_first = |step: &&Step| {
+        let is_visit = matches!(step.kind, ReadingKind::Target { repeat: 0, .. });
+        is_visit && step.swept.is_some_and(|swept| swept.first == step.id)
+    };
+    let firsts: Vec<&Step> = sequence.steps.iter().filter(is_first).collect();
+    if firsts.len() < 3 || firsts.len() >= PLACES_MAX {
+        return None;
+    }
+    let start = sequence.reference.positions;
+    let time = MoveTime::of(rig).without_settling();
+    let (mut here, mut seconds) = (start, 0.0);
+    let mut places = vec![vec![start]];
+    for step in firsts {
+        let windows = u16::try_from(step.swept?.count).ok()?;
+        let flight = step.flight(windows)?;
+        let ends = |flight| {
+            let motion = rig.flight(flight).ok()?;
+            Some([set_out(&motion), comes_to_rest(&motion)].map(|counts| rig.positions(counts)))
+        };
+        let [from, to] = ends(flight)?;
+        seconds += time.directed(&here, &from);
+        here = to;
+        let mut place = vec![from, to];
+        if rig.axes[0].approach == Approach::Either {
+            place.extend(ends(flight.reversed()).into_iter().flatten());
+        }
+        places.push(place);
+    }
+    seconds += time.directed(&here, &start);
+    Some(Way { seconds, least_s: Bound::new(time, &places).raised(seconds) })
 }
 
 /// The times between all places.

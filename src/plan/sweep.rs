@@ -1,4 +1,4 @@
-//! Sweeps of a plan: the arm flies along meridians, place by place, and readings are taken in
+//! Sweeps of a plan: the arm flies along meridians, at one place after the other, and readings are taken in
 //! windows on the way. How far it may go in a window follows from the narrowest feature that is
 //! looked for and from the beam's own width; everything that rig and wire can object to is found
 //! here.
@@ -55,11 +55,7 @@ impl Line {
         if rig.axes[0].approach != Approach::Either {
             return self;
         }
-        let Flight { from, travel, .. } = self.flight;
-        let end = from.plus(travel, self.windows.into());
-        let back = Latched(travel.0.map(|counts| -counts));
-        let flight = Flight { from: end, travel: back, ..self.flight };
-        Self { flight, is_down: !self.is_down, ..self }
+        flipped(self)
     }
 
     /// Where the axes are in the middle of the window of a target, upwards.
@@ -120,46 +116,69 @@ pub(super) fn lines(plan: &Plan, rig: &Rig) -> Result<Vec<Line>, Problem> {
             "take fewer meridians or places, or longer windows",
         ));
     }
-    let mut lines = Vec::new();
-    let mut lowest = 0;
-    let mut is_back = false;
+    let mut stops = Vec::new();
     for (place, &(x_m, y_m)) in places.iter().enumerate() {
         let is_here = |k: &usize| !is_interleaved || grid::dealt(*k, places.len()) == place;
         let here = (0..arc.tables.len()).filter(is_here);
-        let mut tables: Vec<f64> = here.map(|k| arc.tables[k]).collect();
+        let mut tables: Vec<(usize, f64)> = here.map(|k| (k, arc.tables[k])).collect();
         if place % 2 == 1 {
             tables.reverse();
         }
-        for phi in tables {
-            let mut line: Vec<Line> = Vec::new();
-            for (flight, count) in &windows {
-                let at = rig.counts(AxisPositions([0.0, phi, x_m, y_m]));
-                let from = Latched([flight.from.0[0], at.0[1], at.0[2], at.0[3]]);
-                let flight = Flight { from, windows: *count, ..*flight };
-                line.push(Line { flight, windows: *count, lowest, is_down: false });
-                lowest += u32::from(*count);
-            }
-            if is_back || rig.axes[0].approach == Approach::Negative {
-                line.reverse();
-                line = line.into_iter().map(flipped).collect();
-            }
-            is_back = rig.axes[0].approach == Approach::Either && !is_back;
-            lines.extend(line);
+        for (table, phi) in tables {
+            let lowest = u32::try_from(per_meridian * stops.len() as u64).unwrap_or(u32::MAX);
+            let at = rig.counts(AxisPositions([0.0, phi, x_m, y_m]));
+            stops.push(Stop { at, place, table, lowest });
         }
+    }
+    let mut lines = Vec::new();
+    let mut is_back = false;
+    for Stop { at, mut lowest, .. } in in_order(rig, stops) {
+        let mut line: Vec<Line> = Vec::new();
+        for (flight, count) in &windows {
+            let from = Latched([flight.from.0[0], at.0[1], at.0[2], at.0[3]]);
+            let flight = Flight { from, windows: *count, ..*flight };
+            line.push(Line { flight, windows: *count, lowest, is_down: false });
+            lowest += u32::from(*count);
+        }
+        if is_back || rig.axes[0].approach == Approach::Negative {
+            line.reverse();
+            line = line.into_iter().map(flipped).collect();
+        }
+        is_back = rig.axes[0].approach == Approach::Either && !is_back;
+        lines.extend(line);
     }
     check_places(plan, rig, &lines)?;
     Ok(lines)
 }
 
+/// Where a sweep is flown: at a place of the sample, at an angle of the turntable.
+#[derive(Clone, Copy)]
+struct Stop {
+    at: Latched,
+    place: usize,
+    table: usize,
+    /// The target of its lowest window.
+    lowest: u32,
+}
+
+/// Place by place, back and forth over the angles; or angle by angle, back and forth over the places:
+/// whichever way is the shorter for the axes that move.
+fn in_order(rig: &Rig, by_place: Vec<Stop>) -> Vec<Stop> {
+    let mut by_table = by_place.clone();
+    by_table.sort_by_key(|stop| {
+        let is_odd = stop.table % 2 == 1;
+        (stop.table, if is_odd { usize::MAX - stop.place } else { stop.place })
+    });
+    let time = |stops: &[Stop]| -> u128 {
+        let moves = stops.windows(2).map(|pair| rig.move_duration(pair[0].at, pair[1].at));
+        moves.map(|duration| duration.as_micros()).sum()
+    };
+    if time(&by_table) < time(&by_place) { by_table } else { by_place }
+}
+
 /// The same windows from the other end.
 pub(super) fn flipped(line: Line) -> Line {
-    let Flight { from, travel, .. } = line.flight;
-    let flight = Flight {
-        from: from.plus(travel, line.windows.into()),
-        travel: Latched(travel.0.map(|counts| -counts)),
-        ..line.flight
-    };
-    Line { flight, is_down: !line.is_down, ..line }
+    Line { flight: line.flight.reversed(), is_down: !line.is_down, ..line }
 }
 
 /// Where the arm flies: from one of its angles to another, and at which angles of the turntable.

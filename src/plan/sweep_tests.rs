@@ -86,9 +86,13 @@ fn sweeps_go_back_and_forth_and_continue_window_by_window() {
     let ways: Vec<i32> =
         firsts.iter().map(|step| step.swept.unwrap().travel.0[0].signum()).collect();
     assert!(ways.windows(2).all(|pair| pair[0] == -pair[1]), "{ways:?}");
-    // Between planes at one place only the table moves, by a step.
-    let tables: Vec<i32> = firsts[..6].iter().map(|step| step.counts.0[1]).collect();
-    assert!(tables.windows(2).all(|pair| (pair[1] - pair[0]).abs() == 30_000), "{tables:?}");
+    // The stage is quicker than the table: all places of a plane, and then the next, a step further.
+    let tables: Vec<i32> = firsts.iter().map(|step| step.counts.0[1]).collect();
+    assert!(tables.chunks(4).all(|plane| plane.iter().all(|at| *at == plane[0])), "{tables:?}");
+    assert!(tables.chunks(4).zip(tables.chunks(4).skip(1)).all(|(a, b)| b[0] - a[0] == 30_000));
+    // One axis moves at a time.
+    let moved = |a: &Step, b: &Step| (1..4).filter(|i| a.counts.0[*i] != b.counts.0[*i]).count();
+    assert!(firsts.windows(2).all(|pair| moved(pair[0], pair[1]) == 1));
 }
 
 #[test]
@@ -226,4 +230,25 @@ fn interleaved_meridians_are_flown_once_each_at_all_places_alike() {
     let few = plan(&interleaved.replace("phi_step_deg = 15", "phi_step_deg = 60"));
     let refused = few.lay_out(&rig, None).unwrap_err().to_string();
     assert!(refused.contains("interleaved") && refused.contains("3 sweeps for 4"), "{refused}");
+}
+
+#[test]
+fn the_order_of_sweeps_is_set_against_the_least_that_any_order_takes() {
+    let rig = Rig::built_in().unwrap();
+    let way = |text: &str| {
+        let plan = plan(text);
+        let sequence = plan.lay_out(&rig, None).unwrap();
+        plan.way(&rig, &sequence).unwrap()
+    };
+    // 24 sweeps: five turns of the table by 30°, a second each, and 18 moves of the stage by 10 mm, 0.2 s
+    // of the way there and 0.2 s to rest; and the ways from and to the reference.
+    let serpentine = way(PLAN);
+    assert!(serpentine.least_s > 9.0 && serpentine.seconds < 20.0, "{serpentine:?}");
+    assert!(serpentine.gap() > 0.0 && serpentine.gap() < 0.2, "{serpentine:?}");
+    // Flown one way only, the arm has to come back each time: the bound knows that no better.
+    let mut one_way = rig.clone();
+    one_way.axes[0].approach = Approach::Positive;
+    let plan = plan(PLAN);
+    let back = plan.way(&one_way, &plan.lay_out(&one_way, None).unwrap()).unwrap();
+    assert!(back.seconds > serpentine.seconds + 20.0, "{back:?}");
 }

@@ -36,6 +36,11 @@ impl MoveTime {
         }
     }
 
+    /// The same where nothing waits for the axes to be still: what is left dies away on the way.
+    pub(super) fn without_settling(self) -> Self {
+        Self { settle_s: [0.0; 4], ..self }
+    }
+
     /// Seconds from one place to another, until the axes are still, but for where they have to come
     /// from: symmetric, and at most [`Self::directed`].
     pub(super) fn between(&self, a: &AxisPositions, b: &AxisPositions) -> f64 {

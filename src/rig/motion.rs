@@ -23,6 +23,15 @@ pub struct Flight {
     pub windows: u16,
 }
 
+impl Flight {
+    /// The same windows from the other end.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        let from = self.from.plus(self.travel, self.windows.into());
+        Self { from, travel: Latched(self.travel.0.map(|counts| -counts)), ..self }
+    }
+}
+
 impl Rig {
     /// How the axes come to speed, fly and come to rest, by the very rule that devices follow.
     /// Channels in a rejection are places in [`super::AXES`].

@@ -88,7 +88,7 @@ fn in_rig_time(
     }
 }
 
-/// Of every rung at rest how good its order is; sweeps have none to speak of.
+/// Of every rung how good the order of its targets, or of its sweeps, is.
 fn orders(entries: &[Entry]) -> Vec<String> {
     let said = |entry: &Entry| {
         let way = entry.setup.plan.way(&entry.setup.rig, &entry.setup.sequence)?;
