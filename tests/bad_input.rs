@@ -206,6 +206,14 @@ fn samples_from_elsewhere_are_refused_by_line_and_column() {
     refused(&bench, &basis, &["--basis: `zernicke`", "expected one of zernike"]);
     let degree = ["fit", "s.csv", "--basis", "splines", "--angular-degree", "3"];
     refused(&bench, &degree, &["--angular-degree: splines have no degree"]);
+    let spans = ["fit", "s.csv", "--theta-spans", "9", "--phi-spans", "8", "--fine-spans", "3,2,1"];
+    refused(&bench, &spans, &["--fine-spans: no stretch of 9 spans", "FIRST < AFTER_LAST"]);
+    let spans = ["fit", "s.csv", "--theta-spans", "9"];
+    refused(&bench, &spans, &["--phi-spans"]);
+    let columns = ["fit", "s.csv", "--cosine-columns", "2"];
+    refused(&bench, &columns, &["--cosine-columns: cosine columns stand beside", "add the degree"]);
+    let many = ["fit", "s.csv", "--theta-spans=60", "--phi-spans=60", "--position-degree=0"];
+    refused(&bench, &many, &["splines and no strength of their penalty", "or fewer spans"]);
     let power = ["fit", "s.csv", "--penalty-power", "-1"];
     refused(&bench, &power, &["--penalty-power: expected a number of 0 or more"]);
     let degree = ["fit", "s.csv", "--angular-degree", "100000"];

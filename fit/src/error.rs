@@ -50,6 +50,13 @@ pub enum FitError {
         /// With more coefficients than this.
         coefficients_from: usize,
     },
+    /// So many splines, and the strength of their penalty left open: it isn't chosen for that many.
+    StrengthOpen {
+        /// Coefficients of the basis asked for.
+        coefficients: usize,
+        /// Most that a strength is chosen for.
+        coefficients_max: usize,
+    },
     /// A basis out of its range: harmonics beyond degree 200, say.
     Basis {
         /// Which functions.
@@ -221,6 +228,9 @@ impl fmt::Display for FitError {
                 "{wish}: not with more than {coefficients_from} splines; expected fewer spans, or to go \
                  without"
             ),
+            Self::StrengthOpen { coefficients, coefficients_max } => {
+                strength_open(f, *coefficients, *coefficients_max)
+            }
             Self::BasisOfChart { kind, chart } => basis_of_chart(f, kind, chart),
             Self::PlanesTooNear { distance_m } => planes_too_near(f, distance_m * 1e3),
             Self::OutsideSecondPlane { index, s_m, t_m } => {
@@ -288,6 +298,14 @@ fn only_limits(f: &mut fmt::Formatter<'_>, readings: usize) -> fmt::Result {
         f,
         "all {readings} readings are lower limits (saturated), which say no more than that the field is \
          at least so large; expected readings within the range: measure with a less sensitive one"
+    )
+}
+
+fn strength_open(f: &mut fmt::Formatter<'_>, found: usize, most: usize) -> fmt::Result {
+    write!(
+        f,
+        "{found} splines and no strength of their penalty, which is chosen for {most} at most; expected a \
+         strength, or fewer spans"
     )
 }
 

@@ -46,7 +46,9 @@ pub use basis::{Angular, BasisSpec, Fine, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
 pub use chart::{Chart, Face};
-pub use choice::{AngularKind, Candidate, Choice, Gleaning, SweepKind, Wish, choose};
+pub use choice::{
+    AngularKind, Candidate, Choice, Gleaning, Spans, SweepKind, Wish, WishClash, choose,
+};
 pub use coverage::Coverage;
 pub use error::FitError;
 pub use fitted::{Contribution, Estimate, Fit, TRUNCATION};

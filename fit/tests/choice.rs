@@ -189,6 +189,92 @@ fn what_is_pinned_stays_pinned() {
     );
 }
 
+/// The wish for exactly this model.
+fn pinned(model: &fit::Penalised) -> Wish {
+    let (angular, position) = (model.basis.angular, model.basis.position);
+    let kind = AngularKind::ALL.into_iter().find(|kind| kind.name() == angular.name());
+    let mut wish = Wish { kind, angular_degree: angular.degree(), ..Wish::default() };
+    match angular {
+        Angular::Zernike { cosine_columns, .. } => wish.cosine_columns = Some(cosine_columns),
+        Angular::Splines { theta_spans, phi_spans, fine } => {
+            wish.spans = Some(fit::Spans { theta: theta_spans, phi: phi_spans, fine });
+        }
+        _ => {}
+    }
+    match position {
+        fit::Position::Legendre { degree } => wish.position_degree = Some(degree),
+        fit::Position::Splines { spans } => wish.position_spans = Some(spans),
+    }
+    let Penalty { power, strength } = model.penalty;
+    Wish { penalty_power: Some(power), penalty_strength: Some(strength), ..wish }
+}
+
+#[test]
+fn all_that_was_tried_can_be_pinned() {
+    // A lobe for splines in direction, and waves over the sample for such in position.
+    let lobe: Field = |ray| libm::pow(libm::cos(ray.theta_rad), 400.0);
+    let waves: Field = |ray| libm::cos(ray.theta_rad) + libm::sin(500.0 * ray.x_m);
+    let mut candidates = Vec::new();
+    for (rays, field) in
+        [(raster_rays(&CONE, 81, 12, 1), lobe), (raster_rays(&CONE, 5, 4, 9), waves)]
+    {
+        let samples = noisy(&rays, field, 0.002, &mut Die::new(4));
+        let choice = fit::choose(&samples, &CONE, &Wish::default(), None).unwrap().1.unwrap();
+        candidates.extend(choice.candidates.into_iter().map(|candidate| candidate.model));
+    }
+    let is_tried = |of: &dyn Fn(&BasisSpec) -> bool| candidates.iter().any(|c| of(&c.basis));
+    assert!(is_tried(&|spec| matches!(spec.angular, Angular::Zernike { cosine_columns: 2, .. })));
+    assert!(is_tried(
+        &|spec| matches!(spec.angular, Angular::Splines { fine, .. } if !fine.is_none())
+    ));
+    assert!(is_tried(&|spec| matches!(spec.position, fit::Position::Splines { .. })));
+    for model in &candidates {
+        let wish = pinned(model);
+        assert_eq!((wish.clash(), wish.decided()), (None, Some(*model)));
+    }
+}
+
+#[test]
+fn of_pinned_splines_the_penalty_is_chosen() {
+    let rays = raster_rays(&CONE, 21, 12, 1);
+    let samples = noisy(&rays, FIELDS[3].1, 0.01, &mut Die::new(2));
+    let spans = Some(fit::Spans { theta: 7, phi: 12, fine: fit::Fine::NONE });
+    let wish = Wish { spans, position_degree: Some(0), ..Wish::default() };
+    let (model, choice) = fit::choose(&samples, &CONE, &wish, None).unwrap();
+    assert_eq!(choice.unwrap().candidates.len(), 1);
+    let Angular::Splines { theta_spans: 7, phi_spans: 12, fine } = model.basis.angular else {
+        panic!("{model:?}")
+    };
+    assert!(fine.is_none() && model.penalty.strength > 0.0, "{model:?}");
+}
+
+#[test]
+fn what_cannot_be_had_together_is_told_and_so_is_a_strength_that_cannot_be_chosen() {
+    let spans = Some(fit::Spans { theta: 60, phi: 60, fine: fit::Fine::NONE });
+    let splines = Some(AngularKind::Splines);
+    let all = Wish::default();
+    for (wish, clash) in [
+        (Wish { kind: splines, angular_degree: Some(3), ..all }, fit::WishClash::DegreeOfSplines),
+        (Wish { spans, angular_degree: Some(3), ..all }, fit::WishClash::DegreeOfSplines),
+        (Wish { spans, kind: Some(AngularKind::Spherical), ..all }, fit::WishClash::SpansOfOthers),
+        (Wish { cosine_columns: Some(2), ..all }, fit::WishClash::CosineColumns),
+        (
+            Wish { position_degree: Some(1), position_spans: Some(4), ..all },
+            fit::WishClash::DegreeAndSpans,
+        ),
+    ] {
+        assert_eq!(wish.clash(), Some(clash));
+    }
+    let rays = raster_rays(&CONE, 9, 12, 1);
+    let samples = noisy(&rays, FIELDS[3].1, 0.01, &mut Die::new(2));
+    let many = Wish { spans, position_degree: Some(0), ..all };
+    let refused = fit::choose(&samples, &CONE, &many, None).unwrap_err();
+    assert!(refused.to_string().contains("expected a strength, or fewer spans"), "{refused}");
+    let held = Wish { penalty_strength: Some(1.0), ..many };
+    let model = fit::choose(&samples, &CONE, &held, None).unwrap().0;
+    assert!(fit::fit(&samples, &CONE, model, &[]).unwrap().is_sparse());
+}
+
 #[test]
 fn readings_of_unknown_noise_and_few_of_them_have_a_fit() {
     for count in [2, 3, 7, 20] {

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::{AngularKind, Optics, Readings, Region, Resolves, Robust, Rules, Symmetry, Wish};
+use fit::{Optics, Readings, Region, Resolves, Wish};
 
 use super::args::FitArgs;
 use super::derive;
@@ -19,6 +19,7 @@ use super::setup::{Setup, rig_at};
 use super::stream::{self, Scan};
 use super::summary::{field_rows, model_rows, treatment_rows};
 use super::text::{row, table};
+use super::wished::wished;
 use crate::export::{
     FitFile, InputSample, ListedRay, MonteCarlo, RayChart, Treatment, read_rays, write_at,
     write_atomically, write_weights,
@@ -59,89 +60,6 @@ fn rays_at(chart: RayChart, path: &Path) -> Result<Vec<ListedRay>, Failure> {
     let help = format!("expected a header with {names}, and a row for each ray");
     read_rays(chart, &read_csv(path)?)
         .map_err(|error| Failure::with_help(format!("{}: {error}", path.display()), help))
-}
-
-/// What the command line decides, and where it is silent the plan. A basis named here leaves the
-/// plan's degree and penalty, which were meant for another, aside.
-pub(super) fn wished(args: &FitArgs, plan: Wish) -> Result<Wish, Failure> {
-    let kind = args.basis.as_deref().map(kind_named).transpose()?;
-    let base = if kind.is_some() && kind != plan.kind {
-        Wish { position_degree: plan.position_degree, ..Wish::default() }
-    } else {
-        plan
-    };
-    if kind == Some(AngularKind::Splines) && args.angular_degree.is_some() {
-        return Err(Failure::with_help(
-            "--angular-degree: splines have no degree to choose: they are cubic",
-            "leave it out: how many splines there are is chosen from the readings",
-        ));
-    }
-    for (flag, value) in
-        [("--penalty-power", args.penalty_power), ("--penalty-strength", args.penalty_strength)]
-    {
-        if value.is_some_and(|value| !(value >= 0.0 && value.is_finite())) {
-            return Err(Failure::start(format!("{flag}: expected a number of 0 or more")));
-        }
-    }
-    Ok(Wish {
-        kind: kind.or(base.kind),
-        angular_degree: args.angular_degree.or(base.angular_degree),
-        position_degree: args.position_degree.or(base.position_degree),
-        penalty_power: args.penalty_power.or(base.penalty_power),
-        penalty_strength: args.penalty_strength.or(base.penalty_strength),
-        rules: rules(args, plan.rules)?,
-    })
-}
-
-/// What holds beyond the basis, by the command line, and where it is silent the plan.
-fn rules(args: &FitArgs, plan: Rules) -> Result<Rules, Failure> {
-    let unknown = |flag: &str, name: &str, known: String| {
-        Failure::with_help(format!("{flag}: `{name}` is not known"), format!("expected {known}"))
-    };
-    let robust = match &args.robust {
-        None => plan.robust,
-        Some(name) => Robust::ALL
-            .into_iter()
-            .find(|robust| robust.name() == name)
-            .ok_or_else(|| unknown("--robust", name, Robust::ALL.map(Robust::name).join(", ")))?,
-    };
-    let phi_deg = args.symmetry_phi_deg.unwrap_or(0.0);
-    if !phi_deg.is_finite() {
-        return Err(Failure::start("--symmetry-phi-deg: expected a finite angle"));
-    }
-    let known = Symmetry::all_at(phi_deg.to_radians());
-    let symmetry = match &args.symmetry {
-        None => plan.symmetry,
-        Some(name) => Some(
-            known
-                .into_iter()
-                .find(|symmetry| symmetry.key() == name)
-                .ok_or_else(|| unknown("--symmetry", name, known.map(Symmetry::key).join(", ")))?,
-        ),
-    };
-    if args.symmetry_phi_deg.is_some() && !symmetry.is_some_and(Symmetry::has_azimuth) {
-        return Err(Failure::with_help(
-            "--symmetry-phi-deg: rotational symmetry has no mirror",
-            "leave it out, or ask for --symmetry plane or quadrant",
-        ));
-    }
-    Ok(Rules {
-        robust,
-        nonnegative: args.nonnegative || plan.nonnegative,
-        symmetry,
-        drift: args.drift.or(plan.drift),
-        ranges: plan.ranges,
-    })
-}
-
-fn kind_named(name: &str) -> Result<AngularKind, Failure> {
-    AngularKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
-        let known = AngularKind::ALL.map(AngularKind::name).join(", ");
-        Failure::with_help(
-            format!("--basis: `{name}` is not a basis"),
-            format!("expected one of {known}, or none: it is then chosen from the readings"),
-        )
-    })
 }
 
 fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> Outcome {

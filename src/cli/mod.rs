@@ -45,6 +45,7 @@ mod summary;
 mod target;
 mod text;
 mod twins;
+mod wished;
 
 use std::process::ExitCode;
 

@@ -13,10 +13,11 @@ use super::args::FitArgs;
 use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
-use super::fit::{FIT_HELP, beside, optics_of, show, wished};
+use super::fit::{FIT_HELP, beside, optics_of, show};
 use super::output::{note, say};
 use super::results::{fit_region, optics, read_run};
 use super::text::{row, table};
+use super::wished::wished;
 use crate::export::{
     BlockError, FitFile, InputSamples, ListedRay, PartialFile, ReadPartial, Treatment,
     read_sample_blocks, write_atomically,
@@ -116,7 +117,10 @@ const NO_RULES: Rules =
 const DEGREES: Wish = Wish {
     kind: None,
     angular_degree: Some(6),
+    cosine_columns: None,
+    spans: None,
     position_degree: Some(0),
+    position_spans: None,
     penalty_power: None,
     penalty_strength: None,
     rules: NO_RULES,

@@ -5,10 +5,11 @@
 
 use std::time::Duration;
 
-use fit::{AngularKind, Outline, Robust, Rules, Symmetry, Wish};
+use fit::Outline;
 use radiometry::direction::wrap_deg;
 use spanned_toml::{Bounds, Document, Problem, Table};
 
+use super::fitting::read_fit;
 use super::{
     Adaptive, Allocation, Dark, DarkMethod, Expect, Order, Plan, Reference, Region, Schedule, Stop,
     TARGETS_MAX, Wanted, WarmUp,
@@ -22,7 +23,7 @@ const PLACE_MM: Bounds = Bounds::between(-PLACE_MAX_MM, PLACE_MAX_MM);
 const INWARDS: f64 = 1.0 - 1e-12;
 const THETA_DEG: Bounds = Bounds::between(0.0, 90.0);
 /// An azimuth may be written in any turn that a person would write.
-const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
+pub(super) const PHI_DEG: Bounds = Bounds::between(-720.0, 720.0);
 const STEP_DEG: Bounds = Bounds::between(0.001, 360.0);
 /// The wire's dwell is a 32-bit count of microseconds; an hour is well inside.
 const DWELL_MS: Bounds = Bounds::between(0.01, 3_600_000.0);
@@ -37,10 +38,6 @@ const COUNT_MAX: i64 = TARGETS_MAX as i64;
 /// Nodes of a quadrature rule along one coordinate: more are a grid.
 const NODES_MAX: i64 = 256;
 const REPEAT_MAX: i64 = 1_000;
-const ANGULAR_DEGREE_MAX: i64 = 60;
-const POSITION_DEGREE_MAX: i64 = 12;
-const PENALTY_POWER: Bounds = Bounds::between(0.0, 8.0);
-const PENALTY_STRENGTH: Bounds = Bounds::between(0.0, 1e30);
 /// Targets between dark readings, and between reference readings, where the plan does not say.
 const DARK_EVERY: u32 = 200;
 const REFERENCE_EVERY: u32 = 100;
@@ -419,69 +416,6 @@ fn read_stop(table: Table<'_>) -> Result<Stop, Problem> {
     };
     table.finish()?;
     Ok(stop)
-}
-
-/// `[fit]`: what of the fit's basis is decided beforehand; what it doesn't name, and all of it where
-/// there is no such table, is chosen from the readings by leaving out whole sweeps.
-///
-/// `basis`: "zernike", "hemispherical", "even-harmonics" or "splines". `angular_degree`: of the
-/// polynomials in direction, Zernike's unless `basis` says otherwise; splines have none.
-/// `position_degree`: total degree of those in x and y. `penalty_power` and `penalty_strength`: how
-/// roughness is held against the field, see docs/fit.md; 0 for not at all, which is also what a
-/// pinned `angular_degree` means without them.
-fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
-    let degree = |key: &str, most: i64| {
-        let degree = table.integer(key, 0..=most)?;
-        Ok(degree.map(|degree| usize::try_from(degree).unwrap_or_default()))
-    };
-    let fit = Wish {
-        kind: table.choice("basis", &AngularKind::OF_SURFACE.map(|kind| (kind.name(), kind)))?,
-        angular_degree: degree("angular_degree", ANGULAR_DEGREE_MAX)?,
-        position_degree: degree("position_degree", POSITION_DEGREE_MAX)?,
-        penalty_power: table.number("penalty_power", PENALTY_POWER)?,
-        penalty_strength: table.number("penalty_strength", PENALTY_STRENGTH)?,
-        rules: read_rules(&table)?,
-    };
-    if fit.kind == Some(AngularKind::Splines) && fit.angular_degree.is_some() {
-        return Err(table.problem(
-            "angular_degree",
-            "splines have no degree to choose: they are cubic",
-            "no angular_degree beside basis = \"splines\"",
-            "leave it out: how many splines there are is chosen from the readings",
-        ));
-    }
-    table.finish()?;
-    Ok(fit)
-}
-
-/// What holds for the fit beyond its basis.
-///
-/// `robust`: "huber" or "tukey", how readings that don't belong are reweighed; "none" unless asked for,
-/// since a lobe narrower than the basis follows looks like such readings. `nonnegative`: whether the
-/// field is held above zero. `symmetry`: "rotational", "quadrant" or "plane" about the region's middle,
-/// used if the readings bear it; `symmetry_phi_deg`: the azimuth of the mirror, 0 unless said.
-/// `drift`: whether a drift by the reference readings is fitted along; where they show one unless said.
-/// `ranges`: whether the gain ranges' dark levels and gains are; where more than one is used unless said.
-fn read_rules(table: &Table<'_>) -> Result<Rules, Problem> {
-    let robust = table.choice("robust", &Robust::ALL.map(|robust| (robust.name(), robust)))?;
-    let phi_rad = table.number("symmetry_phi_deg", PHI_DEG)?.map(f64::to_radians);
-    let at = phi_rad.unwrap_or(0.0);
-    let symmetry = table.choice("symmetry", &Symmetry::all_at(at).map(|s| (s.key(), s)))?;
-    if phi_rad.is_some() && !symmetry.is_some_and(Symmetry::has_azimuth) {
-        return Err(table.problem(
-            "symmetry_phi_deg",
-            "there is no mirror to stand at an azimuth",
-            "symmetry = \"plane\" or \"quadrant\" beside it",
-            "add one of them, or leave symmetry_phi_deg out",
-        ));
-    }
-    Ok(Rules {
-        robust: robust.unwrap_or_default(),
-        nonnegative: table.flag("nonnegative")?.unwrap_or(false),
-        symmetry,
-        drift: table.flag("drift")?,
-        ranges: table.flag("ranges")?,
-    })
 }
 
 pub(super) fn read_count(table: &Table<'_>, key: &str, most: i64) -> Result<u32, Problem> {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use fit::{AngularKind, Outline, Wish};
+use fit::{AngularKind, Fine, Outline, Spans, Wish};
 use spanned_toml::{Document, Problem, Source};
 
 use super::*;
@@ -73,6 +73,16 @@ fn every_key_is_read_in_si_units() {
 }
 
 #[test]
+fn a_plan_pins_splines() {
+    let pins = "theta_spans = 7\nphi_spans = 12\nfine_spans = [0, 2, 3]";
+    let plan = read(&FULL.replace("angular_degree = 8", pins)).unwrap();
+    let fine = Fine { from: 0, to: 2, halvings: 3 };
+    let spans = Some(Spans { theta: 7, phi: 12, fine });
+    let kind = Some(AngularKind::Splines);
+    assert_eq!(plan.fit, Wish { kind, spans, position_degree: Some(2), ..Wish::default() });
+}
+
+#[test]
 fn what_a_plan_leaves_out_has_a_default() {
     let text = "[region]\nx_mm = [0, 10]\ny_mm = [-4, 4]\ntheta_max_deg = 90\n\
                 [schedule]\nkind = \"low-discrepancy\"\ncount = 10\n\
@@ -140,6 +150,21 @@ fn every_mistake_is_named_at_its_line() {
         ("angular_degree = 8", "basis = \"zernicke\"", "fit.basis"),
         ("angular_degree = 8", "angular_degree = 8\nbasis = \"splines\"", "fit.angular_degree"),
         ("angular_degree = 8", "penalty_power = -1", "fit.penalty_power"),
+        ("angular_degree = 8", "theta_spans = 8", "fit.theta_spans"),
+        ("angular_degree = 8", "phi_spans = 0", "fit.phi_spans"),
+        ("angular_degree = 8", "fine_spans = [0, 1, 1]", "fit.fine_spans"),
+        (
+            "angular_degree = 8",
+            "theta_spans = 4\nphi_spans = 8\nfine_spans = [2, 5, 1]",
+            "fit.fine_spans",
+        ),
+        (
+            "angular_degree = 8",
+            "basis = \"spherical\"\ntheta_spans = 4\nphi_spans = 8",
+            "fit.theta_spans",
+        ),
+        ("angular_degree = 8", "cosine_columns = 2", "fit.cosine_columns"),
+        ("angular_degree = 8", "position_spans = 4", "fit.position_spans"),
         ("angular_degree = 8", "robust = \"hubert\"", "fit.robust"),
         ("angular_degree = 8", "nonnegative = 1", "fit.nonnegative"),
         ("angular_degree = 8", "symmetry = \"round\"", "fit.symmetry"),

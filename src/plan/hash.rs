@@ -6,7 +6,7 @@
 use core::fmt;
 
 use firmware_protocol::Shutter;
-use fit::{Outline, Rules, Symmetry, Wish};
+use fit::{Outline, Rules, Spans, Symmetry, Wish};
 
 use super::{Plan, Sequence, Step};
 use crate::rig::ReadingKind;
@@ -91,6 +91,20 @@ impl Fnv {
             for number in numbers {
                 self.number(number.unwrap_or(-1.0));
             }
+        }
+        if let Some(columns) = wish.cosine_columns {
+            self.bytes(b"cosine columns");
+            self.integer(columns as u64);
+        }
+        if let Some(Spans { theta, phi, fine }) = wish.spans {
+            self.bytes(b"spans");
+            for number in [theta, phi, fine.from, fine.to, fine.halvings] {
+                self.integer(number as u64);
+            }
+        }
+        if let Some(spans) = wish.position_spans {
+            self.bytes(b"spans in position");
+            self.integer(spans as u64);
         }
         let rules = &wish.rules;
         if *rules != Rules::default() {

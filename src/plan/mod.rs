@@ -20,6 +20,7 @@ mod expect_tests;
 mod file;
 #[cfg(test)]
 mod file_tests;
+mod fitting;
 mod grid;
 mod hash;
 mod layout;

@@ -78,6 +78,22 @@ impl Fine {
     /// All spans alike.
     pub const NONE: Self = Self { from: 0, to: 0, halvings: 0 };
 
+    /// Of `[first, after_last, halvings]` among so many spans: whole numbers, the first below the second.
+    pub fn of(numbers: &[f64], theta_spans: usize) -> Option<Self> {
+        let whole = |i: usize| {
+            let number = *numbers.get(i)?;
+            let is_whole = number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just bounded
+            is_whole.then_some(number as usize)
+        };
+        let fine = Self { from: whole(0)?, to: whole(1)?, halvings: whole(2)? };
+        let is_sound = numbers.len() == 3
+            && fine.from < fine.to
+            && fine.to <= theta_spans
+            && (1..=HALVINGS_MAX).contains(&fine.halvings);
+        is_sound.then_some(fine)
+    }
+
     /// Whether all spans are alike.
     pub fn is_none(&self) -> bool {
         self.halvings == 0 || self.to <= self.from

@@ -11,138 +11,19 @@ mod family;
 mod gleaning;
 mod search;
 mod sweeps;
+mod wish;
 
 use crate::beam::Optics;
 use crate::check::check;
 use crate::grid::Grid;
-use crate::{
-    Angular, BasisSpec, Chart, FitError, Penalised, Penalty, Position, Ray, Region, Rules, Sample,
-};
-use family::{Strengths, Trial};
+use crate::{Angular, BasisSpec, FitError, Penalised, Position, Ray, Region, Sample, sparse};
+use family::Trial;
 use search::Search;
 
 pub use gleaning::Gleaning;
 pub use sweeps::SweepKind;
 pub(crate) use sweeps::Sweeps;
-
-/// A kind of functions of the direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AngularKind {
-    /// [`Angular::Zernike`].
-    Zernike,
-    /// [`Angular::Hemispherical`].
-    Hemispherical,
-    /// [`Angular::EvenHarmonics`].
-    EvenHarmonics,
-    /// [`Angular::Splines`].
-    Splines,
-    /// [`Angular::Spherical`].
-    Spherical,
-    /// [`Angular::SecondPlane`].
-    SecondPlane,
-}
-
-impl AngularKind {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Zernike,
-        Self::Hemispherical,
-        Self::EvenHarmonics,
-        Self::Splines,
-        Self::Spherical,
-        Self::SecondPlane,
-    ];
-    /// Those of the surface chart.
-    pub const OF_SURFACE: [Self; 5] =
-        [Self::Zernike, Self::Hemispherical, Self::EvenHarmonics, Self::Spherical, Self::Splines];
-
-    /// The one that has degrees, and is taken where a degree is named and no kind.
-    pub const fn of_chart(chart: &Chart) -> Self {
-        match chart {
-            Chart::Surface => Self::Zernike,
-            Chart::Perpendicular { .. } | Chart::Environment => Self::Spherical,
-            Chart::TwoPlane { .. } => Self::SecondPlane,
-        }
-    }
-
-    /// The functions of a degree; splines have none.
-    pub const fn of_degree(self, degree: usize) -> Option<Angular> {
-        match self {
-            Self::Zernike => Some(Angular::Zernike { degree, cosine_columns: 0 }),
-            Self::Hemispherical => Some(Angular::Hemispherical { degree }),
-            Self::EvenHarmonics => Some(Angular::EvenHarmonics { degree }),
-            Self::Spherical => Some(Angular::Spherical { degree }),
-            Self::SecondPlane => Some(Angular::SecondPlane { degree }),
-            Self::Splines => None,
-        }
-    }
-
-    /// As plans write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Zernike => "zernike",
-            Self::Hemispherical => "hemispherical",
-            Self::EvenHarmonics => "even-harmonics",
-            Self::Splines => "splines",
-            Self::Spherical => "spherical",
-            Self::SecondPlane => "legendre",
-        }
-    }
-}
-
-/// What a person has decided; the rest is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wish {
-    /// Which functions of the direction.
-    pub kind: Option<AngularKind>,
-    /// Their degree; splines have none. A degree without a kind means Zernike polynomials.
-    pub angular_degree: Option<usize>,
-    /// Total degree in the position.
-    pub position_degree: Option<usize>,
-    /// [`Penalty::power`]; 0 for none.
-    pub penalty_power: Option<f64>,
-    /// [`Penalty::strength`]; 0 for none. Of power 2 unless another is wished for.
-    pub penalty_strength: Option<f64>,
-    /// What holds beyond the basis.
-    pub rules: Rules,
-}
-
-impl Wish {
-    /// The same for a chart: of those other than the surface one there is one kind alone.
-    #[must_use]
-    pub fn in_chart(self, chart: &Chart) -> Self {
-        let only = (*chart != Chart::Surface).then(|| AngularKind::of_chart(chart));
-        Self { kind: self.kind.or(only), ..self }
-    }
-
-    /// The one model that is left; `None` if there is something to choose. Who names the degree
-    /// in direction gets plain least squares unless a penalty is named too.
-    pub fn decided(&self) -> Option<Penalised> {
-        let penalty = self.penalty()?;
-        let position = Position::Legendre { degree: self.position_degree? };
-        let degree = self.angular_degree?;
-        let angular = self.kind.unwrap_or(AngularKind::Zernike).of_degree(degree)?;
-        Some(Penalised::new(BasisSpec { angular, position }, penalty))
-    }
-
-    fn penalty(&self) -> Option<Penalty> {
-        match (self.penalty_power, self.penalty_strength) {
-            (Some(0.0), _) | (_, Some(0.0)) => Some(Penalty::NONE),
-            (power, Some(strength)) => Some(Penalty { power: power.unwrap_or(2.0), strength }),
-            (None, None) if self.angular_degree.is_some() => Some(Penalty::NONE),
-            (_, None) => None,
-        }
-    }
-
-    fn strengths(&self, scale_min: f64) -> Strengths {
-        let (power, strength) = match self.penalty() {
-            Some(penalty) if penalty.is_none() => (Some(0.0), Some(0.0)),
-            Some(penalty) => (Some(penalty.power), Some(penalty.strength)),
-            None => (self.penalty_power, None),
-        };
-        Strengths { power, strength, scale_min }
-    }
-}
+pub use wish::{AngularKind, Spans, Wish, WishClash};
 
 /// What was chosen, from what.
 #[derive(Debug, Clone, PartialEq)]
@@ -191,6 +72,7 @@ pub fn choose(
     if let Some(model) = wish.decided() {
         return Ok((model, None));
     }
+    strength_can_be_chosen(wish)?;
     check(samples, region, smallest(region, 0, 0).into(), &[])?;
     one_pose(samples, region)?;
     let sweeps = Sweeps::of(samples, region).thinned(search::readings_max(optics));
@@ -210,10 +92,11 @@ pub fn choose(
     tried.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
     prefer_finer(&mut tried);
     let Some(&(_, best)) = tried.first() else {
-        // Nothing can be left out: the mean is all there is.
-        let degree = wish.angular_degree.unwrap_or(0);
-        let model = smallest(region, degree, wish.position_degree.unwrap_or(0)).into();
-        return Ok((model, None));
+        // Nothing can be left out: the mean is all there is, or what was pinned.
+        let smallest = smallest(region, 0, 0);
+        let angular = wish.angular().unwrap_or(smallest.angular);
+        let position = wish.position().unwrap_or(smallest.position);
+        return Ok((BasisSpec { angular, position }.into(), None));
     };
     let truncation = truncation(&tried);
     let candidates = tried.iter().map(|(spec, trial)| Candidate {
@@ -232,6 +115,17 @@ pub fn choose(
     };
     let model = Penalised { truncation, ..choice.candidates[0].model };
     Ok((model, Some(choice)))
+}
+
+/// Splines that are pinned, and too many for a choice to go through strengths of their penalty.
+fn strength_can_be_chosen(wish: &Wish) -> Result<(), FitError> {
+    let (Some(angular), Some(position)) = (wish.angular(), wish.position()) else { return Ok(()) };
+    let coefficients = BasisSpec { angular, position }.len();
+    if coefficients > sparse::COEFFICIENTS_FROM {
+        let coefficients_max = sparse::COEFFICIENTS_FROM;
+        return Err(FitError::StrengthOpen { coefficients, coefficients_max });
+    }
+    Ok(())
 }
 
 /// A basis of a region's chart that is taken where nothing can be chosen.

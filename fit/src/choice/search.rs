@@ -59,16 +59,20 @@ impl<'s> Search<'s> {
     }
 
     pub(super) fn run(&mut self) -> Result<(), FitError> {
-        let position = Position::Legendre { degree: self.position()? };
+        let position = match self.wish.position_spans {
+            Some(spans) => Position::Splines { spans },
+            None => Position::Legendre { degree: self.position()? },
+        };
         let kinds: &[AngularKind] = match &self.wish.kind {
             Some(kind) => std::slice::from_ref(kind),
+            None if self.wish.spans.is_some() => &[AngularKind::Splines],
             None if self.wish.angular_degree.is_some() => &[AngularKind::Zernike],
             None => &[AngularKind::Zernike, AngularKind::Spherical, AngularKind::Splines],
         };
         for kind in kinds {
             self.rising(&self.angular(*kind), position)?;
         }
-        if kinds.contains(&AngularKind::Splines) {
+        if kinds.contains(&AngularKind::Splines) && self.wish.spans.is_none() {
             self.refine(position)?;
         }
         // The best direction's basis may ask for another degree in position.
@@ -121,32 +125,26 @@ impl<'s> Search<'s> {
 
     /// Candidates of a kind, rising.
     fn angular(&self, kind: AngularKind) -> Vec<Angular> {
-        let degrees = |list: &[usize]| match self.wish.angular_degree {
-            Some(degree) => vec![degree],
-            None => list.to_vec(),
-        };
-        let cosine_columns = if self.wish.angular_degree.is_some() { 0 } else { COSINE_COLUMNS };
+        if let Some(angular) = self.wish.angular() {
+            return vec![angular];
+        }
         match kind {
-            AngularKind::Zernike => degrees(&ZERNIKE)
+            AngularKind::Zernike => ZERNIKE
                 .into_iter()
-                .map(|degree| Angular::Zernike { degree, cosine_columns })
+                .map(|degree| Angular::Zernike { degree, cosine_columns: COSINE_COLUMNS })
                 .collect(),
-            AngularKind::Hemispherical => degrees(&HEMISPHERICAL)
-                .into_iter()
-                .map(|degree| Angular::Hemispherical { degree })
-                .collect(),
-            AngularKind::EvenHarmonics => degrees(&ZERNIKE)
-                .into_iter()
-                .map(|degree| Angular::EvenHarmonics { degree })
-                .collect(),
-            AngularKind::Spherical => degrees(&SPHERICAL)
-                .into_iter()
-                .map(|degree| Angular::Spherical { degree })
-                .collect(),
-            AngularKind::SecondPlane => degrees(&SECOND_PLANE)
-                .into_iter()
-                .map(|degree| Angular::SecondPlane { degree })
-                .collect(),
+            AngularKind::Hemispherical => {
+                HEMISPHERICAL.into_iter().map(|degree| Angular::Hemispherical { degree }).collect()
+            }
+            AngularKind::EvenHarmonics => {
+                ZERNIKE.into_iter().map(|degree| Angular::EvenHarmonics { degree }).collect()
+            }
+            AngularKind::Spherical => {
+                SPHERICAL.into_iter().map(|degree| Angular::Spherical { degree }).collect()
+            }
+            AngularKind::SecondPlane => {
+                SECOND_PLANE.into_iter().map(|degree| Angular::SecondPlane { degree }).collect()
+            }
             AngularKind::Splines => SPLINES
                 .into_iter()
                 .map(|(theta_spans, phi_spans)| Angular::Splines {
@@ -162,7 +160,7 @@ impl<'s> Search<'s> {
     fn rising(&mut self, list: &[Angular], position: Position) -> Result<(), FitError> {
         let affordable = |angular: &&Angular| {
             self.is_affordable(BasisSpec { angular: **angular, position })
-                || self.wish.angular_degree.is_some()
+                || self.wish.angular().is_some()
         };
         let list: Vec<Angular> = list.iter().filter(affordable).copied().collect();
         let (mut best, mut worse) = (f64::NEG_INFINITY, 0);

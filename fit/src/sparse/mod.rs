@@ -320,7 +320,7 @@ fn named(combination: &[f64], basis: &Basis) -> FitError {
 }
 
 /// Splines with more functions than this are fitted here: a dense triangle of as many takes 32 MB.
-const COEFFICIENTS_FROM: usize = 2000;
+pub(crate) const COEFFICIENTS_FROM: usize = 2000;
 /// Corrections by the rows' residuals at most; one is enough up to a condition of 1e6.
 const REFINEMENTS: usize = 4;
 /// What of the gradient is aimed at, and what may be left.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 
 use super::ChartArgs;
 
@@ -19,13 +20,14 @@ pub(crate) struct FitArgs {
     #[arg(long, requires = "output", conflicts_with_all = ["merge", "at", "json"])]
     pub(crate) partial: bool,
     /// Merge partial fits: the fit of all their samples.
-    #[arg(long, conflicts_with_all = ["basis", "angular_degree", "position_degree",
-        "penalty_power", "penalty_strength", "rig"])]
+    #[arg(long, conflicts_with_all = ["basis", "angular_degree", "cosine_columns", "theta_spans",
+        "phi_spans", "fine_spans", "position_degree", "position_spans", "penalty_power",
+        "penalty_strength", "rig"])]
     pub(crate) merge: bool,
     #[command(flatten)]
     pub(crate) chart: ChartArgs,
-    /// Functions of the direction: zernike, hemispherical, even-harmonics or splines; in the
-    /// perpendicular and the environment chart spherical, between two planes legendre. Default: what
+    /// Functions of the direction: zernike, hemispherical, even-harmonics, spherical or splines; in
+    /// the perpendicular and the environment chart spherical, between two planes legendre. Default: what
     /// the plan pins, or else the one that predicts left-out sweeps best.
     #[arg(long, value_name = "NAME")]
     pub(crate) basis: Option<String>,
@@ -33,6 +35,24 @@ pub(crate) struct FitArgs {
     /// penalty unless one is given. Default: as for --basis.
     #[arg(long, value_name = "N")]
     pub(crate) angular_degree: Option<usize>,
+    /// Beside Zernike polynomials of a degree: how many functions cos θ Z(2k,0). Default: none.
+    #[arg(long, value_name = "N", value_parser = count(0..=8))]
+    pub(crate) cosine_columns: Option<usize>,
+    /// Pin splines: equal spans of θ from the normal to the horizon. What isn't named of their penalty is
+    /// chosen; of more than 2000 splines its strength has to be.
+    #[arg(long, value_name = "N", requires = "phi_spans", value_parser = count(1..=4096))]
+    pub(crate) theta_spans: Option<usize>,
+    /// Pin splines: equal spans of φ round the horizon.
+    #[arg(long, value_name = "N", requires = "theta_spans", value_parser = count(1..=4096))]
+    pub(crate) phi_spans: Option<usize>,
+    /// Where those spans of θ are halved, and how often: the first, the one after the last, halvings.
+    #[arg(
+        long,
+        value_name = "FIRST,AFTER_LAST,HALVINGS",
+        requires = "theta_spans",
+        value_delimiter = ','
+    )]
+    pub(crate) fine_spans: Option<Vec<f64>>,
     /// Power of the degree that is held against rough fields, 0 to 18 (of splines 1 or 2); 0 for
     /// plain least squares.
     #[arg(long, value_name = "POWER", allow_negative_numbers = true)]
@@ -43,6 +63,9 @@ pub(crate) struct FitArgs {
     /// Highest total degree of the polynomials over position.
     #[arg(long, value_name = "N")]
     pub(crate) position_degree: Option<usize>,
+    /// Pin splines over position: equal spans along each side of the region.
+    #[arg(long, value_name = "N", conflicts_with = "position_degree", value_parser = count(1..=64))]
+    pub(crate) position_spans: Option<usize>,
     /// Reweigh readings that don't belong: huber, tukey or none. Tukey's leaves a reading out that is
     /// six standard deviations off. Default: what the plan's [fit] says, or none, since a lobe
     /// narrower than the basis follows looks like such readings.
@@ -110,4 +133,9 @@ fn yes_or_no(text: &str) -> Result<bool, String> {
         "no" => Ok(false),
         _ => Err("expected yes or no".to_owned()),
     }
+}
+
+/// A count within bounds.
+fn count(range: std::ops::RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::<usize>::new().range(range)
 }

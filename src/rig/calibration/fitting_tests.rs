@@ -122,7 +122,10 @@ fn region(calibrated: &Calibrated) -> (Vec<Ray>, fit::Region) {
 const WISH: Wish = Wish {
     kind: None,
     angular_degree: Some(4),
+    cosine_columns: None,
+    spans: None,
     position_degree: Some(0),
+    position_spans: None,
     penalty_power: None,
     penalty_strength: None,
     rules: Rules {
