@@ -213,7 +213,11 @@ fn samples_from_elsewhere_are_refused_by_line_and_column() {
     let columns = ["fit", "s.csv", "--cosine-columns", "2"];
     refused(&bench, &columns, &["--cosine-columns: cosine columns stand beside", "add the degree"]);
     let many = ["fit", "s.csv", "--theta-spans=60", "--phi-spans=60", "--position-degree=0"];
-    refused(&bench, &many, &["splines and no strength of their penalty", "or fewer spans"]);
+    refused(
+        &bench,
+        &many,
+        &["--theta-spans: no strength of the penalty", "more than 2000 splines"],
+    );
     let power = ["fit", "s.csv", "--penalty-power", "-1"];
     refused(&bench, &power, &["--penalty-power: expected a number of 0 or more"]);
     let degree = ["fit", "s.csv", "--angular-degree", "100000"];

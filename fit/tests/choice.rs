@@ -268,6 +268,7 @@ fn what_cannot_be_had_together_is_told_and_so_is_a_strength_that_cannot_be_chose
     let rays = raster_rays(&CONE, 9, 12, 1);
     let samples = noisy(&rays, FIELDS[3].1, 0.01, &mut Die::new(2));
     let many = Wish { spans, position_degree: Some(0), ..all };
+    assert_eq!(many.clash(), Some(fit::WishClash::OpenStrength));
     let refused = fit::choose(&samples, &CONE, &many, None).unwrap_err();
     assert!(refused.to_string().contains("expected a strength, or fewer spans"), "{refused}");
     let held = Wish { penalty_strength: Some(1.0), ..many };

@@ -45,7 +45,7 @@ pub(super) fn wished(args: &FitArgs, plan: Wish) -> Result<Wish, Failure> {
     if let Some(clash) = wish.clash() {
         let flag = match clash {
             WishClash::DegreeOfSplines => "--angular-degree",
-            WishClash::SpansOfOthers => "--theta-spans",
+            WishClash::SpansOfOthers | WishClash::OpenStrength => "--theta-spans",
             WishClash::CosineColumns => "--cosine-columns",
             WishClash::DegreeAndSpans => "--position-spans",
         };

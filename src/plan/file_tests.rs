@@ -163,6 +163,7 @@ fn every_mistake_is_named_at_its_line() {
             "basis = \"spherical\"\ntheta_spans = 4\nphi_spans = 8",
             "fit.theta_spans",
         ),
+        ("angular_degree = 8", "theta_spans = 60\nphi_spans = 60", "fit.theta_spans"),
         ("angular_degree = 8", "cosine_columns = 2", "fit.cosine_columns"),
         ("angular_degree = 8", "position_spans = 4", "fit.position_spans"),
         ("angular_degree = 8", "robust = \"hubert\"", "fit.robust"),

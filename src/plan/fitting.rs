@@ -39,7 +39,7 @@ pub(super) fn read_fit(table: Table<'_>) -> Result<Wish, Problem> {
     if let Some(clash) = fit.clash() {
         let key = match clash {
             WishClash::DegreeOfSplines => "angular_degree",
-            WishClash::SpansOfOthers => "theta_spans",
+            WishClash::SpansOfOthers | WishClash::OpenStrength => "theta_spans",
             WishClash::CosineColumns => "cosine_columns",
             WishClash::DegreeAndSpans => "position_spans",
         };

@@ -119,13 +119,9 @@ pub fn choose(
 
 /// Splines that are pinned, and too many for a choice to go through strengths of their penalty.
 fn strength_can_be_chosen(wish: &Wish) -> Result<(), FitError> {
-    let (Some(angular), Some(position)) = (wish.angular(), wish.position()) else { return Ok(()) };
-    let coefficients = BasisSpec { angular, position }.len();
-    if coefficients > sparse::COEFFICIENTS_FROM {
-        let coefficients_max = sparse::COEFFICIENTS_FROM;
-        return Err(FitError::StrengthOpen { coefficients, coefficients_max });
-    }
-    Ok(())
+    let coefficients_max = sparse::COEFFICIENTS_FROM;
+    let refused = |coefficients| FitError::StrengthOpen { coefficients, coefficients_max };
+    wish.splines_of_open_strength().map(refused).map_or(Ok(()), Err)
 }
 
 /// A basis of a region's chart that is taken where nothing can be chosen.

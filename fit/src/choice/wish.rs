@@ -1,7 +1,7 @@
 //! What of a fit's basis a person has decided. Knows no reading.
 
 use super::family::Strengths;
-use crate::{Angular, BasisSpec, Chart, Fine, Penalised, Penalty, Position, Rules};
+use crate::{Angular, BasisSpec, Chart, Fine, Penalised, Penalty, Position, Rules, sparse};
 
 /// A kind of functions of the direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,9 +122,18 @@ impl Wish {
             Some(WishClash::CosineColumns)
         } else if self.position_degree.is_some() && self.position_spans.is_some() {
             Some(WishClash::DegreeAndSpans)
+        } else if self.splines_of_open_strength().is_some() {
+            Some(WishClash::OpenStrength)
         } else {
             None
         }
+    }
+
+    /// How many splines are pinned, where they are too many for a choice to go through strengths of
+    /// their penalty and none is named.
+    pub(super) fn splines_of_open_strength(&self) -> Option<usize> {
+        let basis = BasisSpec { angular: self.angular()?, position: self.position()? };
+        (self.penalty().is_none() && sparse::is_called_for(basis)).then(|| basis.len())
     }
 
     /// The one model that is left; `None` if there is something to choose. Who names the degree
@@ -185,6 +194,8 @@ pub enum WishClash {
     CosineColumns,
     /// A degree and spans, both of the position.
     DegreeAndSpans,
+    /// More splines than a strength of their penalty is chosen for, and none named.
+    OpenStrength,
 }
 
 impl WishClash {
@@ -195,6 +206,7 @@ impl WishClash {
             Self::SpansOfOthers => "spans of theta and phi beside splines alone",
             Self::CosineColumns => "an angular degree of Zernike polynomials beside cosine columns",
             Self::DegreeAndSpans => "a position degree, or position spans",
+            Self::OpenStrength => "a penalty strength beside more than 2000 splines, 0 for none",
         }
     }
 
@@ -208,6 +220,9 @@ impl WishClash {
             Self::SpansOfOthers => "leave the spans out, or ask for splines",
             Self::CosineColumns => "add the degree, or leave them to be chosen",
             Self::DegreeAndSpans => "leave one of them out",
+            Self::OpenStrength => {
+                "name it, as the choice in the fit.json of a coarser fit does, or ask for fewer spans"
+            }
         }
     }
 }
@@ -218,6 +233,7 @@ impl std::fmt::Display for WishClash {
             Self::DegreeOfSplines => "splines have no degree to choose: they are cubic",
             Self::SpansOfOthers => "polynomials and harmonics have a degree and no spans",
             Self::CosineColumns => "cosine columns stand beside Zernike polynomials of a degree",
+            Self::OpenStrength => "no strength of the penalty is chosen for so many splines",
             Self::DegreeAndSpans => "the position has polynomials of a degree or splines of spans",
         })
     }
