@@ -29,6 +29,8 @@ const LINE_BYTES_MAX: usize = 80;
 /// How long a real board takes for a line, and for a reset.
 const PARSE_US: u64 = 1_000;
 const BOOT_US: u64 = 50_000;
+/// How long it is at saying an alarm (`report.c` waits so long for its buffer).
+const ALARM_US: u64 = 500_000;
 /// What it goes back from its switches, in its unit.
 const PULL_OFF: f64 = 2.0;
 /// Beyond the rig's travel, in its unit: room for the pull-off and the run-ups.
@@ -105,6 +107,8 @@ pub struct GrblTwin {
     line: Vec<u8>,
     has_line: bool,
     waiting: Option<Waiting>,
+    /// While it says a limit's alarm it forgets resets.
+    deaf_until: Instant,
     /// When the next byte can be looked at.
     busy_until: Instant,
     homing: Option<Homing>,
@@ -141,6 +145,7 @@ impl GrblTwin {
             line: Vec::new(),
             has_line: false,
             waiting: None,
+            deaf_until: Instant::ZERO,
             busy_until: Instant::ZERO,
             homing: None,
             feed: 0.0,
@@ -222,6 +227,9 @@ impl GrblTwin {
 
     /// 0x18: everything is forgotten but the position; a motion that is cut off loses steps.
     fn reset(&mut self, now: Instant) {
+        if matches!(self.state, State::Alarm(Some(_))) && now < self.deaf_until {
+            return;
+        }
         let holds_still =
             self.state == State::Hold && self.leg.as_ref().is_none_or(|leg| leg.ends_at() <= now);
         let was_homing = self.homing.take().is_some();
@@ -255,6 +263,7 @@ impl GrblTwin {
         self.blocks.clear();
         self.waiting = None;
         self.say(&format!("ALARM:{number}"));
+        self.deaf_until = Instant::from_micros(now.micros() + ALARM_US);
         // Limits lock it until it is reset.
         self.state = State::Alarm(Some(number).filter(|number| *number <= 2));
         if matches!(number, 1 | 2) {
@@ -306,6 +315,8 @@ impl GrblTwin {
                 homing::Progress::Missed => {
                     self.alarm(now, 9);
                     self.state = State::Alarm(None);
+                    // It starts over by itself.
+                    self.boots_at = Some(Instant::from_micros(now.micros() + ALARM_US));
                 }
                 homing::Progress::Searching => self.homing = Some(homing),
             }

@@ -50,7 +50,7 @@ impl GrblTwin {
 
     /// The answer to `$$`.
     pub(super) fn list_settings(&mut self) {
-        let common: [(u16, f64); 24] = [
+        let common: [(u16, f64); 22] = [
             (0, 10.0),
             (1, 25.0),
             (2, 0.0),
@@ -73,11 +73,10 @@ impl GrblTwin {
             (30, 1000.0),
             (31, 0.0),
             (32, 0.0),
-            (33, 0.0),
-            (34, 0.0),
         ];
-        for (number, value) in common.into_iter().filter(|(number, _)| *number <= 32) {
-            let text = if value.fract() == 0.0 && number < 11 {
+        for (number, value) in common {
+            let is_whole = matches!(number, 0..=10 | 13 | 20..=23 | 26 | 30..);
+            let text = if is_whole {
                 format!("${number}={value:.0}")
             } else {
                 format!("${number}={value:.3}")

@@ -162,6 +162,8 @@ fn a_reset_in_motion_and_a_target_outside_are_alarms() {
     assert_eq!(desk.tell("G53G0X5\n", 50), "ALARM:2\r\n[MSG:Reset to continue]\r\n");
     // It looks at no line before it is reset.
     assert_eq!(desk.tell("$X\n", 50), "");
+    // Nor does it hear a reset while it says the alarm.
+    assert_eq!(desk.tell("\u{18}", 500), "");
     assert!(desk.tell("\u{18}", 200).contains("Grbl 1.1h"));
     assert!(desk.tell("$X\n", 50).ends_with("ok\r\n"));
     assert!(desk.tell("?", 50).starts_with("<Idle|MPos:-2.000,"));
@@ -179,7 +181,7 @@ fn homing_answers_no_question_and_a_reset_breaks_it_off() {
 fn the_settings_say_what_its_axes_are() {
     let mut desk = Desk::new();
     let heard = desk.tell("$$\n", 500);
-    for line in ["$22=1.000", "$100=1000.000", "$110=6000.000", "$122=1000.000", "$13=0.000"] {
+    for line in ["$22=1", "$100=1000.000", "$110=6000.000", "$122=1000.000", "$13=0", "$30=1000"] {
         assert!(heard.lines().any(|l| l == line), "{line}\n{heard}");
     }
     assert!(heard.ends_with("ok\r\n"));

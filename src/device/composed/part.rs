@@ -97,18 +97,28 @@ impl Composer {
                 self.answered(n, Awaited::Shutter);
             }
             AxesEvent::Stopped(located) => {
+                self.forget_shutter(n);
                 if let Some(located) = located {
                     self.locate(n, &located);
                 }
                 self.answered(n, Awaited::Stopped);
             }
             AxesEvent::Cleared => {
+                self.forget_shutter(n);
                 if let Some(part) = self.parts.get_mut(n) {
                     part.fault = None;
                 }
                 self.answered(n, Awaited::Cleared);
             }
             AxesEvent::Trouble(trouble) => self.trouble(now, n, trouble),
+        }
+    }
+
+    /// Coming to rest may switch a board's outputs off, and leaving a fault does: whether the
+    /// shutter is where it was put is not known any more.
+    fn forget_shutter(&mut self, n: usize) {
+        if self.shutter_part().is_none_or(|part| part == n) {
+            self.meter.shutter = None;
         }
     }
 
@@ -132,6 +142,8 @@ impl Composer {
         let Some(part) = self.parts.get_mut(n) else { return };
         let was_opening = part.awaited == Some(Awaited::Ready);
         part.awaited = None;
+        self.forget_shutter(n);
+        let Some(part) = self.parts.get_mut(n) else { return };
         match trouble {
             Trouble::Fault(fault) => {
                 if fault.loses_position {

@@ -346,6 +346,25 @@ fn a_stop_goes_to_whatever_moves_and_ends_all_commands_once_it_stands() {
     assert_eq!(play.arm.told(), ["MoveTo([1000, 1000])"]);
 }
 
+/// A reset at rest, by which a grbl forgets its lines, switches its coolant off: the shutter opens.
+#[test]
+fn where_the_shutter_is_after_a_stop_is_not_believed() {
+    let mut play = Play::homed();
+    play.composer.parts[0].facts.as_mut().unwrap().has_shutter = true;
+    play.request(dwell(2, Shutter::Closed));
+    assert_eq!(play.arm.told(), ["PutShutter(Closed)"]);
+    play.arm_says(AxesEvent::ShutterIs(Shutter::Closed));
+    assert_eq!(play.meter.told(), ["zero"]);
+    play.forget();
+    play.request(Request::Stop);
+    play.arm_says(AxesEvent::Stopped(Some(at([0, 0]))));
+    play.table_says(AxesEvent::Stopped(Some(at([0, 0]))));
+    play.request(Request::ClearFault);
+    play.forget();
+    play.request(dwell(3, Shutter::Closed));
+    assert_eq!(play.arm.told(), ["PutShutter(Closed)"], "again");
+}
+
 #[test]
 fn a_fault_of_one_device_stops_the_other_and_keeps_its_name() {
     let mut play = Play::homed();

@@ -184,6 +184,9 @@ impl Grbl {
             Task::Opening(_) => self.begin_opening(now, Some(version)),
             Task::Stopping(stopping) => self.stopped_by_reset(now, stopping),
             Task::Clearing(_) => self.go_on_clearing(now),
+            // After an alarm of homing the board starts over by itself; it has said that its
+            // position is lost.
+            Task::None if self.alarm.is_some_and(|number| describe_alarm(number).1) => {}
             _ => {
                 self.rest();
                 self.say(AxesEvent::Trouble(Trouble::Restarted));
@@ -313,7 +316,7 @@ impl Driver for Grbl {
             Task::Opening(step) => self.open_again(now, step),
             Task::Homing { until, .. } => self.homing_late(now, until),
             Task::Stopping(stopping) => self.stopping_late(now, stopping),
-            Task::Clearing(_) => self.clearing_late(now),
+            Task::Clearing(clearing) => self.clearing_late(now, &clearing),
             Task::Locating | Task::Moving(_) | Task::PuttingShutter(_) => self.ask_again(now),
         }
     }

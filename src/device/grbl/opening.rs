@@ -3,11 +3,11 @@
 
 use std::time::Duration;
 
-use firmware_protocol::{Cause, Instant};
+use firmware_protocol::Instant;
 
 use super::{ANSWER_WITHIN, Grbl, Purpose, Report, State, Stream, Task, byte};
 use crate::device::axes::{AxesEvent, AxesFacts, AxisFacts};
-use crate::device::driver::{NamedFault, Refusal, Trouble};
+use crate::device::driver::{Refusal, Trouble};
 
 /// A board that was reset by opening its port answers after two seconds, at most.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -32,8 +32,8 @@ enum Stage {
     /// What it was doing comes to rest.
     Calming,
     /// `$I`, then `$$`.
-    Asking(State),
-    Listing(State),
+    Asking,
+    Listing,
 }
 
 impl Grbl {
@@ -74,10 +74,21 @@ impl Grbl {
                 self.go(Stage::Calming, until);
                 self.ask_at = Some(now + ANSWER_WITHIN);
             }
-            // At rest in a hold: a reset forgets what is queued, and loses no step.
-            (Stage::Greeting | Stage::Calming, State::Hold(0)) => {
+            (Stage::Greeting | Stage::Calming, State::Door(_)) if step.was_reset => self.refuse((
+                "its safety door is open, in which state it answers no line".to_owned(),
+                "a closed door".to_owned(),
+                "close the door; or, where there is none, look at the board's door input"
+                    .to_owned(),
+            )),
+            // At rest, in a state in which it reads no lines: a reset forgets what is queued, and
+            // loses no step.
+            (
+                Stage::Greeting | Stage::Calming,
+                state @ (State::Hold(0) | State::Door(0..=1) | State::Sleep),
+            ) => {
                 self.urgent.push(byte::RESET);
-                self.go(Stage::Calming, until);
+                let was_reset = step.was_reset || matches!(state, State::Door(_));
+                self.task = Task::Opening(Step { until, stage: Stage::Calming, was_reset });
                 self.ask_at = Some(now + ANSWER_WITHIN);
             }
             (Stage::Greeting | Stage::Calming, State::Check) => self.refuse((
@@ -85,22 +96,20 @@ impl Grbl {
                 "a board that moves".to_owned(),
                 "send $C, or reset the board".to_owned(),
             )),
-            (
-                Stage::Greeting | Stage::Calming,
-                state @ (State::Idle | State::Alarm | State::Door(_) | State::Sleep),
-            ) => {
+            (Stage::Greeting | Stage::Calming, State::Idle | State::Alarm) => {
                 self.board.axes = match &report.position {
                     super::Position::Machine(axes) | super::Position::Work(axes) => axes.len(),
                 };
-                // Ends half a line that somebody may have left; its answer is nobody's.
-                self.stream.push("", Purpose::Move);
+                // Spoils half a line that somebody may have left, and which an empty one would have
+                // carried out; alone it asks for help. Its answer is nobody's.
+                self.stream.push("$", Purpose::Move);
                 self.stream.push("$I", Purpose::Ask);
-                self.go(Stage::Asking(state), until.max(now + TALK));
+                self.go(Stage::Asking, until.max(now + TALK));
                 self.ask_at = Some(now + TALK / 2);
             }
             // Still braking; or a report that comes late.
             (Stage::Greeting | Stage::Calming, _) => self.ask_at = Some(now + ANSWER_WITHIN / 3),
-            (Stage::Asking(_) | Stage::Listing(_), _) => {}
+            (Stage::Asking | Stage::Listing, _) => {}
         }
     }
 
@@ -108,15 +117,15 @@ impl Grbl {
     pub(super) fn answered(&mut self, now: Instant) {
         let Task::Opening(Step { stage, .. }) = &self.task else { return };
         match *stage {
-            Stage::Asking(state) if self.board.version.is_some() => {
+            Stage::Asking if self.board.version.is_some() => {
                 if let Err(unfit) = self.board.check_version() {
                     return self.refuse(unfit);
                 }
                 self.stream.push("$$", Purpose::Ask);
-                self.go(Stage::Listing(state), now + 2 * TALK);
+                self.go(Stage::Listing, now + 2 * TALK);
                 self.ask_at = Some(now + TALK);
             }
-            Stage::Listing(state) => match self.facts(state) {
+            Stage::Listing => match self.facts() {
                 Ok(facts) => {
                     self.stream = Stream::new(self.board.buffer());
                     self.rest();
@@ -125,14 +134,14 @@ impl Grbl {
                 Err(unfit) => self.refuse(unfit),
             },
             // The answer to something older.
-            Stage::Asking(_) | Stage::Greeting | Stage::Calming => {}
+            Stage::Asking | Stage::Greeting | Stage::Calming => {}
         }
     }
 
     /// No answer in time.
     pub(super) fn open_again(&mut self, now: Instant, step: Step) {
         let Step { until, stage, was_reset } = step;
-        let is_talking = matches!(stage, Stage::Asking(_) | Stage::Listing(_));
+        let is_talking = matches!(stage, Stage::Asking | Stage::Listing);
         if !was_reset && self.garbled == 0 && (now >= until || is_talking) {
             // After a limit's alarm it answers nothing, or nothing but `?`, until it is reset. At
             // rest a reset loses nothing, and a board that does not answer is not moving, or homes.
@@ -157,7 +166,7 @@ impl Grbl {
         }
         match stage {
             Stage::Greeting | Stage::Calming => self.ask(now),
-            Stage::Asking(_) | Stage::Listing(_) => {
+            Stage::Asking | Stage::Listing => {
                 // Its buffer may hold what an earlier host sent: begin again.
                 self.stream.clear();
                 self.go(Stage::Greeting, until);
@@ -166,7 +175,7 @@ impl Grbl {
         }
     }
 
-    fn facts(&mut self, state: State) -> Result<AxesFacts, super::settings::Unfit> {
+    fn facts(&mut self) -> Result<AxesFacts, super::settings::Unfit> {
         self.board.check_modes()?;
         let places = self.board.places(&self.letters)?;
         let mut scaled = Vec::new();
@@ -176,12 +185,6 @@ impl Grbl {
             axes.push(self.board.facts(place)?);
         }
         self.places = scaled;
-        let fault = matches!(state, State::Door(_)).then(|| NamedFault {
-            device: self.name.clone(),
-            name: "the safety door is open".to_owned(),
-            cause: Cause::Stopped,
-            loses_position: false,
-        });
         let version = self.board.version.as_deref().unwrap_or_default();
         Ok(AxesFacts {
             identity: format!("grbl {version}"),
@@ -190,7 +193,7 @@ impl Grbl {
             is_homed: false,
             is_synchronous: true,
             has_shutter: self.shutter.is_some(),
-            fault,
+            fault: None,
         })
     }
 

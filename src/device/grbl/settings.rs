@@ -52,9 +52,10 @@ impl Board {
             self.options = Some(options.to_owned());
         } else if let Some(axes) = feedback.strip_prefix("AXS:") {
             self.letters = axes.split(':').nth(1).map(str::to_owned);
-        } else if feedback.starts_with("0.") {
-            // How versions before 1.1 answer: `[0.9j.20160316:]`.
-            self.version = Some(feedback.trim_end_matches(':').to_owned());
+        } else if feedback.starts_with(|first: char| first.is_ascii_digit()) {
+            // How versions before 1.1 answer, and the first ones of it: `[0.9j.20160316:]`.
+            let version = feedback.split(':').next().unwrap_or_default();
+            self.version = Some(version.to_owned());
         }
     }
 

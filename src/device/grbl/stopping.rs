@@ -13,6 +13,8 @@ use crate::device::axes::AxesEvent;
 
 /// How long braking may take before the board is reset as it moves.
 const BRAKING: Duration = Duration::from_secs(3);
+/// A board that says an alarm is deaf to resets for half a second: so much later it is sent again.
+const RESET_AGAIN: Duration = Duration::from_secs(1);
 /// How long a reset may take.
 const RESETTING: Duration = Duration::from_secs(3);
 
@@ -146,7 +148,7 @@ impl Grbl {
         self.stream.clear();
         self.urgent = vec![byte::RESET];
         self.task = Task::Clearing(Clearing { until: now + RESETTING, is_unlocking: false });
-        self.ask_at = Some(now + RESETTING);
+        self.ask_at = Some(now + RESET_AGAIN);
     }
 
     /// The banner after the reset.
@@ -168,7 +170,12 @@ impl Grbl {
         }
     }
 
-    pub(super) fn clearing_late(&mut self, _now: Instant) {
+    pub(super) fn clearing_late(&mut self, now: Instant, clearing: &Clearing) {
+        if now < clearing.until && !clearing.is_unlocking {
+            self.urgent = vec![byte::RESET];
+            self.ask_at = Some(clearing.until.min(now + RESET_AGAIN));
+            return;
+        }
         let what = format!("{}: no banner after a reset", self.name);
         self.fail(super::Trouble::Silent(what));
     }

@@ -34,7 +34,7 @@ impl Talk {
         let mut talk = Self::new(letters);
         assert_eq!(talk.sent(), "?");
         talk.says(IDLE);
-        assert_eq!(talk.sent(), "\n$I\n");
+        assert_eq!(talk.sent(), "$\n$I\n");
         talk.says("ok\r\n");
         talk.says(BUILD);
         assert_eq!(talk.sent(), "$$\n");
@@ -133,7 +133,7 @@ fn a_board_that_boots_with_a_fresh_memory_is_waited_for() {
     talk.says("\r\nGrbl 1.1h ['$' for help]\r\n>:error:7\r\n[MSG:'$H'|'$X' to unlock]\r\n");
     assert_eq!(talk.sent(), "?");
     talk.says("<Alarm|MPos:0.000,0.000,0.000|FS:0,0>\r\n");
-    assert_eq!(talk.sent(), "\n$I\n");
+    assert_eq!(talk.sent(), "$\n$I\n");
     talk.says("ok\r\n");
     talk.says(BUILD);
     talk.says(SETTINGS);
@@ -188,13 +188,13 @@ fn a_board_that_a_limit_has_locked_is_reset_once() {
     // As grblHAL does it: it reports, and answers no line.
     let mut talk = Talk::new(&['X']);
     talk.says("<Alarm|MPos:1.000,0.000,0.000|FS:0,0>\r\n");
-    assert_eq!(talk.sent(), "\n$I\n");
+    assert_eq!(talk.sent(), "$\n$I\n");
     talk.tick();
     assert_eq!(talk.sent(), "\x18");
     talk.says("\r\nGrbl 1.1h ['$' for help]\r\n[MSG:'$H'|'$X' to unlock]\r\n");
     assert_eq!(talk.sent(), "?");
     talk.says("<Alarm|MPos:1.000,0.000,0.000|FS:0,0>\r\n");
-    assert_eq!(talk.sent(), "\n$I\n");
+    assert_eq!(talk.sent(), "$\n$I\n");
     // One that answers nothing still is not asked for ever.
     talk.tick();
     assert!(talk.silence().contains("no answer from a grbl"));
@@ -384,10 +384,65 @@ fn homing_is_done_when_it_stands_and_a_stop_breaks_it_off() {
 
     talk.begin(AxesCommand::Home);
     talk.sent();
-    talk.says("ALARM:9\r\n");
+    // limits.c and main.c: it starts over by itself, and answers the line no more.
+    talk.says("ALARM:9\r\n\r\nGrbl 1.1h ['$' for help]\r\n[MSG:'$H'|'$X' to unlock]\r\n");
     let (name, cause, _) = talk.fault();
     assert!(name.contains("no limit switch within the travel"), "{name}");
     assert_eq!(cause, Cause::HomingMissed(0));
+    assert_eq!(talk.event(), None, "nor is it a restart");
+}
+
+#[test]
+fn half_a_line_that_somebody_left_is_spoilt_and_not_carried_out() {
+    let mut talk = Talk::new(&['X']);
+    talk.says(IDLE);
+    // "G0X5" stood in its buffer: "G0X5$" is no g-code, and without the "$" it would have moved.
+    assert_eq!(talk.sent(), "$\n$I\n");
+    talk.says("error:1\r\n");
+    talk.says(BUILD);
+    talk.says(SETTINGS);
+    assert!(matches!(talk.event(), Some(AxesEvent::Ready(_))));
+}
+
+#[test]
+fn a_board_that_reads_no_lines_is_reset_and_one_whose_door_is_open_is_refused() {
+    const BANNER: &str = "\r\nGrbl 1.1h ['$' for help]\r\n";
+    for asleep in ["Sleep", "Door:0", "Door:1"] {
+        let mut talk = Talk::new(&['X']);
+        talk.says(&format!("<{asleep}|MPos:0.000,0.000,0.000|FS:0,0>\r\n"));
+        assert_eq!(talk.sent(), "\u{18}", "{asleep}");
+        talk.says(BANNER);
+        talk.says(IDLE);
+        assert_eq!(talk.sent(), "$\n$I\n", "{asleep}");
+    }
+    let mut talk = Talk::new(&['X']);
+    talk.says("<Door:1|MPos:0.000,0.000,0.000|FS:0,0|Pn:D>\r\n");
+    talk.says(BANNER);
+    talk.says("[MSG:Check Door]\r\n<Door:1|MPos:0.000,0.000,0.000|FS:0,0|Pn:D>\r\n");
+    let words = talk.refusal();
+    assert!(words.contains("safety door is open") && words.contains("close the door"), "{words}");
+}
+
+#[test]
+fn a_reset_that_an_alarm_swallowed_is_sent_again() {
+    let mut talk = Talk::opened(&['X']);
+    talk.begin(AxesCommand::MoveTo(vec![-250]));
+    talk.sent();
+    talk.says("ok\r\nALARM:1\r\n[MSG:Reset to continue]\r\n");
+    talk.fault();
+    talk.begin(AxesCommand::Clear);
+    assert_eq!(talk.sent(), "\u{18}");
+    talk.tick();
+    assert_eq!(
+        talk.sent(),
+        "\u{18}",
+        "protocol.c forgets the first one, that it was sent too soon"
+    );
+    talk.says("\r\nGrbl 1.1h ['$' for help]\r\n[MSG:'$H'|'$X' to unlock]\r\n");
+    assert_eq!(talk.event(), Some(AxesEvent::Cleared));
+    talk.begin(AxesCommand::Clear);
+    assert_eq!(talk.wait().matches('\u{18}').count(), 3);
+    assert!(talk.silence().contains("no banner after a reset"));
 }
 
 #[test]
