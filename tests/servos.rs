@@ -145,6 +145,19 @@ fn a_servo_in_another_mode_or_turn_is_refused_when_it_is_reached() {
     let run = ["run", "plan.toml", "--out", "run"];
     bench.gonio(&run).refused(&["servo 1 (theta): operating mode 1", "register 11"]);
     assert_eq!(bench.names(), before);
+
+    // At another rate servos hear nothing; or what they say is garbage here.
+    let rig = bench.text("rig.toml");
+    let port = bench.path("dynamixel").display().to_string();
+    let other = rig.replace("baud = 1_000_000", "baud = 115_200");
+    for (end, words) in [
+        (bench::device::mute(), ["no servo answers at 115200 baud", "--baud 57600"]),
+        (bench::device::chatterer(), ["not in Dynamixel's protocol 2.0", "check the baud rate"]),
+    ] {
+        std::fs::write(bench.path("rig.toml"), other.replace(&port, &end)).unwrap();
+        bench.gonio(&run).refused(&words);
+        assert_eq!(bench.names(), before);
+    }
     drop(sim);
 
     // Without their zeros x and y would leave the servos' turn.

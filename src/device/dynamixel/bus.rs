@@ -112,6 +112,11 @@ impl Bus {
         *self = Self::new(self.baud);
     }
 
+    /// Bits a second.
+    pub(super) const fn baud(&self) -> u32 {
+        self.baud
+    }
+
     /// What was heard that is no answer.
     pub(super) const fn bad(&self) -> BadPackets {
         self.decoder.bad()

@@ -61,6 +61,8 @@ pub struct Dynamixel {
     doing: Doing,
     /// When to go on by itself.
     wake: Option<Instant>,
+    /// Until when a bus on which nobody says anything may still be booting.
+    boots_until: Instant,
     /// Whether the torque is on by our doing, or was found on: then it must stay on.
     is_engaged: bool,
     ticks: Ticks,
@@ -94,6 +96,7 @@ impl Dynamixel {
             bus: Bus::new(baud),
             doing: Doing::Nothing,
             wake: None,
+            boots_until: Instant::ZERO,
             is_engaged: false,
             ticks: Ticks::default(),
             events: VecDeque::new(),

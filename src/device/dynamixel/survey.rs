@@ -17,6 +17,8 @@ use crate::device::driver::{Refusal, Trouble};
 const PING: Duration = Duration::from_millis(120);
 /// Between two rounds of pings.
 const PING_AGAIN: Duration = Duration::from_millis(100);
+/// Servos answer a second after their power came on, adapters sooner.
+const BOOT: Duration = Duration::from_secs(4);
 /// After so many rounds it is said what is missing, where anything is heard at all.
 const ROUNDS: u32 = 3;
 
@@ -49,6 +51,7 @@ impl Asked {
 
 impl Dynamixel {
     pub(super) fn begin_survey(&mut self, now: Instant) {
+        self.boots_until = now + BOOT;
         self.doing = Doing::Survey(Survey::Ping(0, 1));
         self.ping_next(now);
     }
@@ -67,6 +70,14 @@ impl Dynamixel {
             self.read(0, Asked::Modes);
         } else if let Some(refusal) = self.missing().filter(|_| round >= ROUNDS) {
             self.refuse(refusal);
+        } else if now >= self.boots_until {
+            let (name, baud) = (&self.name, self.bus.baud());
+            let what = format!(
+                "{name}: no servo answers at {baud} baud, and nothing else does; are they powered, \
+                 is this their port, and is this their rate (register 8)? New ones speak 57600: \
+                 `gonio ports --probe PORT --baud 57600` asks who is there"
+            );
+            self.end(AxesEvent::Trouble(Trouble::Silent(what)));
         } else {
             self.doing = Doing::Survey(Survey::Ping(0, round + 1));
             self.wake = Some(now + PING_AGAIN);

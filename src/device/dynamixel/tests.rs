@@ -342,10 +342,13 @@ fn what_can_t_be_driven_is_refused_at_once_and_named() {
 }
 
 #[test]
-fn nobody_on_the_bus_is_waited_for_until_the_caller_has_no_patience() {
+fn a_bus_on_which_nobody_answers_may_boot_and_is_not_waited_for_for_ever() {
     let mut pair = Pair::new(vec![], Wire::new(BAUD));
     pair.driver.open(pair.now);
     assert_eq!(pair.event_within(Duration::from_secs(3)), None);
+    let event = pair.event_within(Duration::from_secs(2));
+    let Some(AxesEvent::Trouble(Trouble::Silent(words))) = event else { panic!("{event:?}") };
+    assert!(words.contains("no servo answers at 1000000 baud"), "{words}");
 }
 
 #[test]
