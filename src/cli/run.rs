@@ -89,7 +89,9 @@ pub(crate) fn finish(
         results => results?,
     };
     let (header, sessions) = (journal.reader().header()?, journal.reader().sessions()?);
-    let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+    let events = journal.reader().events()?;
+    let record =
+        RunRecord { header: &header, readings: &readings, sessions: &sessions, events: &events };
     results.write(folder, setup, &record)?;
     let closed = journal.close();
     let summary = Summary {

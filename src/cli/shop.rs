@@ -205,8 +205,14 @@ impl Shop {
     fn evaluate(&self, folder: &Path) -> Result<Finished, Failure> {
         let (setup, header, readings) = read_run(folder)?;
         let results = Results::of(&setup, setup.plan.fit, &readings)?;
-        let sessions = Reader::open(&folder.join(JOURNAL))?.sessions()?;
-        let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+        let reader = Reader::open(&folder.join(JOURNAL))?;
+        let (sessions, events) = (reader.sessions()?, reader.events()?);
+        let record = RunRecord {
+            header: &header,
+            readings: &readings,
+            sessions: &sessions,
+            events: &events,
+        };
         results.write(folder, &setup, &record)?;
         let (measured, planned) = (results.calibrated.samples.len(), targets_planned(&setup));
         let fit = match &results.fitted {

@@ -168,6 +168,8 @@ pub(super) enum Said {
         device: (u8, Option<u8>),
         host: (u8, u8),
     },
+    /// What the devices of a rig call themselves, before the identity that they make.
+    Devices(Vec<String>),
     /// No answer to `Identify`.
     Unheard(LinkCause),
 }
@@ -181,6 +183,8 @@ pub struct Controller {
     orders: mpsc::UnboundedSender<Order>,
     said: mpsc::UnboundedReceiver<Said>,
     statistics: watch::Receiver<LinkStatistics>,
+    /// What its devices call themselves.
+    devices: Vec<String>,
     task: JoinHandle<()>,
 }
 
@@ -200,7 +204,8 @@ impl Controller {
         let (statistics, watched) = watch::channel(LinkStatistics::default());
         let pump = Pump::new(link, HostEndpoint::new(session, baud), from_task, statistics);
         let task = tokio::spawn(pump.run(to_task));
-        let mut native = Self { name, baud, orders, said, statistics: watched, task };
+        let devices = Vec::new();
+        let mut native = Self { name, baud, orders, said, statistics: watched, devices, task };
         let identity = native.identify(patience).await?;
         Ok((native, identity))
     }
@@ -217,7 +222,8 @@ impl Controller {
         let (from_task, said) = mpsc::unbounded_channel();
         let (_, statistics) = watch::channel(LinkStatistics::default());
         let task = tokio::spawn(composed::pump(composer, links, to_task, from_task));
-        let mut composed = Self { name, baud: 0, orders, said, statistics, task };
+        let devices = Vec::new();
+        let mut composed = Self { name, baud: 0, orders, said, statistics, devices, task };
         // Each driver has a patience of its own.
         let identity = composed.identify(Duration::ZERO).await?;
         Ok((composed, identity))
@@ -252,6 +258,7 @@ impl Controller {
                 })) => return Ok(Ok(identity)),
                 Some(Said::Unheard(cause)) => return Ok(Err(cause)),
                 Some(Said::Unfit(error)) => return Err(error),
+                Some(Said::Devices(devices)) => self.devices = devices,
                 Some(Said::Device(DeviceEvent::LinkLost(LinkLost::HungUp { detail, .. }))) => {
                     return Err(ConnectError::HungUp { port, detail });
                 }
@@ -321,6 +328,12 @@ impl Controller {
         }
     }
 
+    /// What the devices of a rig of several call themselves, each with its driver's name; empty
+    /// for a controller of gonio's own.
+    pub fn devices(&self) -> &[String] {
+        &self.devices
+    }
+
     /// What messages call the links.
     pub fn name(&self) -> &str {
         &self.name
@@ -351,8 +364,15 @@ impl Controller {
     /// up says so again and again.
     pub async fn next_event(&mut self) -> DeviceEvent {
         let port = self.name.clone();
-        let detail = match self.said.recv().await {
+        let said = loop {
+            match self.said.recv().await {
+                Some(Said::Devices(devices)) => self.devices = devices,
+                said => break said,
+            }
+        };
+        let detail = match said {
             Some(Said::Device(event)) => return event,
+            Some(Said::Devices(_)) => String::new(),
             Some(Said::Version { .. }) => "it now speaks another protocol version".to_owned(),
             Some(Said::Unheard(cause)) => cause.to_string(),
             Some(Said::Unfit(error)) => error.to_string(),

@@ -83,6 +83,8 @@ pub struct Session {
 pub enum EventKind {
     /// A pause ended.
     Continue,
+    /// What one of the rig's devices calls itself, at the begin of a session.
+    Device,
     /// The rig is unwell.
     Fault,
     /// The axes found their home marks.
@@ -208,6 +210,7 @@ macro_rules! names {
 names!(InputRole { Plan = "plan", Rig = "rig", Scene = "scene", Attachment = "attachment" });
 names!(EventKind {
     Continue = "continue",
+    Device = "device",
     Fault = "fault",
     Homed = "homed",
     Note = "note",

@@ -239,7 +239,7 @@ impl<'a> Engine<'a> {
     }
 
     fn connected(&mut self, reached: &Reached) {
-        let Reached { identity, status, windows } = reached;
+        let Reached { identity, status, windows, devices } = reached;
         let now = self.now();
         self.unreached = None;
         match self.boot_id.replace(identity.boot_id) {
@@ -254,6 +254,9 @@ impl<'a> Engine<'a> {
                     boot_id: identity.boot_id,
                     started_s: self.session_began_s,
                 });
+                for device in devices {
+                    self.note(EventKind::Device, device);
+                }
             }
         }
         let connected = Connected {

@@ -43,6 +43,8 @@ pub(super) struct Reached {
     pub(super) status: Status,
     /// The most windows that a sweep of it can have; 0: it can't sweep.
     pub(super) windows: u16,
+    /// What the devices of a rig of several call themselves.
+    pub(super) devices: Vec<String>,
 }
 
 /// See the module.
@@ -69,8 +71,9 @@ impl Hardware {
                 && let Ok(windows) = controller.windows(&identity).await
             {
                 check_agreement(&identity, &self.rig)?;
+                let devices = controller.devices().to_vec();
                 self.controller = Some(controller);
-                return Ok(Reached { identity, status, windows });
+                return Ok(Reached { identity, status, windows, devices });
             }
             self.leaving = Some(controller.let_go());
         }
@@ -80,8 +83,9 @@ impl Hardware {
         check_agreement(&identity, &self.rig)?;
         let status = controller.status().await?;
         let windows = controller.windows(&identity).await?;
+        let devices = controller.devices().to_vec();
         self.controller = Some(controller);
-        Ok(Reached { identity, status, windows })
+        Ok(Reached { identity, status, windows, devices })
     }
 
     async fn connect(&mut self) -> Result<(Controller, Identity), ReachError> {

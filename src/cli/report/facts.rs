@@ -6,7 +6,7 @@ use crate::cli::results::{Results, targets_planned};
 use crate::cli::setup::Setup;
 use crate::cli::text::{duration, percent};
 use crate::device::Composer;
-use crate::journal::InputRole;
+use crate::journal::{Event, EventKind, InputRole};
 use crate::report::significant;
 use crate::rig::calibration::{Fitted, Flag, Part};
 
@@ -58,7 +58,8 @@ pub(super) fn facts(
                 || "no device watchdog".to_owned(),
                 |after| format!("stops by itself after {} ms", after.as_millis()),
             );
-            format!("{name}: {watchdog}; done means {}", promises.done)
+            let called = called(record, &name);
+            format!("{name}: {called}{watchdog}; done means {}", promises.done)
         });
         facts.push(("Devices", devices.collect::<Vec<_>>().join(". ")));
     }
@@ -67,6 +68,15 @@ pub(super) fn facts(
     }
     facts.push(("Program", format!("gonio {}", header.program_version)));
     facts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
+}
+
+/// What a device called itself when it was last reached, if it was.
+fn called(record: &RunRecord<'_>, device: &str) -> String {
+    let name = |event: &Event| {
+        let text = event.text.strip_prefix(device)?.strip_prefix(": ")?;
+        (event.kind == EventKind::Device).then(|| format!("{}; ", text.trim()))
+    };
+    record.events.iter().rev().find_map(name).unwrap_or_default()
 }
 
 fn outline(setup: &Setup) -> String {

@@ -24,7 +24,7 @@ use super::setup::Setup;
 use super::summary::unseen_in_words;
 use super::text::{row, table};
 use crate::export::write_atomically;
-use crate::journal::{Header, Reader, Session};
+use crate::journal::{Event, Header, Reader, Session};
 use crate::report::{Report, Section};
 use crate::rig::Reading;
 
@@ -37,14 +37,17 @@ pub(crate) struct RunRecord<'a> {
     pub(crate) header: &'a Header,
     pub(crate) readings: &'a [Reading],
     pub(crate) sessions: &'a [Session],
+    pub(crate) events: &'a [Event],
 }
 
 /// Renders a run's report again.
 pub(crate) fn report(args: &ReportArgs) -> Outcome {
     let (setup, header, readings) = read_run(&args.dir)?;
-    let sessions = Reader::open(&args.dir.join(JOURNAL))?.sessions()?;
+    let reader = Reader::open(&args.dir.join(JOURNAL))?;
+    let (sessions, events) = (reader.sessions()?, reader.events()?);
     let results = Results::of(&setup, setup.plan.fit, &readings)?;
-    let record = RunRecord { header: &header, readings: &readings, sessions: &sessions };
+    let record =
+        RunRecord { header: &header, readings: &readings, sessions: &sessions, events: &events };
     let report = of(&setup, &results, &record);
     let output = args.output.clone().unwrap_or_else(|| args.dir.join(REPORT));
     if output == Path::new("-") {

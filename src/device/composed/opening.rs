@@ -3,7 +3,7 @@
 use firmware_protocol::{AxisIdentity, Identity, Instant, Reply, RequestType};
 
 use super::part::Awaited;
-use super::{Composer, DeviceEvent, Halting, QUEUE_DEPTH, SPOKEN};
+use super::{Composer, DeviceEvent, Halting, QUEUE_DEPTH, SPOKEN, Said};
 use crate::device::axes::{AxesCommand, AxesFacts};
 use crate::device::controller::ConnectError;
 use crate::device::driver::Refusal;
@@ -40,6 +40,7 @@ impl Composer {
             }
             Some(Opening::Asking) if self.are_all_ready() => {
                 self.opening = None;
+                self.said.push_back(Said::Devices(self.names()));
                 let identity = Reply::Identity(self.identity());
                 self.say(DeviceEvent::Reply {
                     request: RequestType::Identify,
@@ -116,6 +117,16 @@ impl Composer {
             self.fault.get_or_insert(fault.cause);
         }
         part.facts = Some(facts);
+    }
+
+    /// What each device calls itself.
+    fn names(&self) -> Vec<String> {
+        let axes = self.parts.iter().filter_map(|part| {
+            Some(format!("{}: {}", part.driver.name(), part.facts.as_ref()?.identity))
+        });
+        let meter = self.meter.facts.as_ref();
+        let meter = meter.map(|facts| format!("{}: {}", self.meter.driver.name(), facts.identity));
+        axes.chain(meter).collect()
     }
 
     /// What the devices are, as one.
