@@ -21,6 +21,7 @@ shutter = \"flood\"
 [photometer]
 driver = \"keithley-6485\"
 baud = 57600
+nplc = 0.025
 ";
 
 const ONE_LINK: &str = "[link]\nkind = \"simulated\"\nbaud = 1_000_000\n";
@@ -239,10 +240,46 @@ fn an_axis_that_no_device_moves_stands_where_the_rig_file_says() {
     own.gonio(&run).refused(&["y is fixed, on a rig with one controller", "[[axes_link]]"]);
 }
 
+/// The words of a table, for a meter that nobody here knows.
+const TABLE: &str = "driver = \"scpi\"\nidentity = \"OPTOMETER\"\nmeasures = \"current\"\n\
+    set_up = [\"*RST\", \"CONF:CURR\"]\nzero = [\"ZERO\"]\nrange = \"CURR:RANG {}\"\n\
+    read = \"MEAS?\"\nelement = 1\nbaud = 115200\n";
+
+#[test]
+fn a_plan_runs_on_a_meter_that_a_table_describes() {
+    let keithley = "driver = \"keithley-6485\"\nbaud = 57600\nnplc = 0.025\n";
+    let bench = on_devices().with("rig.toml", keithley, TABLE);
+    bench.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    let samples = table(&bench, "run/samples.csv");
+    assert!(samples.of("radiance_w_per_m2_sr").iter().all(|l| (l / 50.2 - 1.0).abs() < 0.02));
+    // The report says who it was, as it called itself.
+    let page = bench.text("run/report.html");
+    for words in ["scpi meter", "SIMULATED,OPTOMETER", "grbl 1.1h", "no device watchdog"] {
+        assert!(page.contains(words), "{words}");
+    }
+
+    // Another instrument, and a word that it does not know, over its own line.
+    let drivers = ["grbl", "scpi"];
+    let bench = twins::at_ports(on_devices().with("rig.toml", keithley, TABLE), &drivers);
+    let _sim = Devices::switched_on(&bench, &drivers);
+    let run = ["run", "plan.toml", "--out", "run"];
+    let before = bench.names();
+    let bench = bench.with("rig.toml", "\"OPTOMETER\"", "\"PHOTOMETER\"");
+    bench.gonio(&run).refused(&["SIMULATED,OPTOMETER", "a name with \"PHOTOMETER\" in it"]);
+    assert_eq!(bench.names(), before);
+}
+
+#[test]
+fn a_picoammeter_can_t_give_more_readings_than_its_integration_lets_it() {
+    let bench = on_devices().with("rig.toml", "nplc = 0.025", "nplc = 1");
+    let words = ["2000 readings a second of 1 power line cycles each", "at most 60", "nplc"];
+    bench.gonio(&["run", "plan.toml", "--out", "run"]).refused(&words);
+}
+
 #[test]
 fn a_meter_in_another_unit_and_garbage_are_refused_when_they_are_reached() {
     let newport = "driver = \"newport-1830c\"\nranges = [4, 3, 2, 1]\n";
-    let keithley = "driver = \"keithley-6485\"\nbaud = 57600\n";
+    let keithley = "driver = \"keithley-6485\"\nbaud = 57600\nnplc = 0.025\n";
     let drivers = ["grbl", "newport-1830c"];
     let bench = twins::at_ports(on_devices().with("rig.toml", keithley, newport), &drivers);
     let _sim = Devices::switched_on(&bench, &drivers);

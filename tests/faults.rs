@@ -25,7 +25,7 @@ fn gantry() -> Bench {
     let devices = "[link]\nkind = \"simulated\"\n\n[[axes_link]]\ndriver = \"grbl\"\n\
         letters = { theta = \"X\", phi = \"Y\", x = \"Z\", y = \"A\" }\n\
         zero_deg = { theta = -100, phi = -190 }\nzero_mm = { x = -55, y = -55 }\n\
-        shutter = \"flood\"\n\n[photometer]\ndriver = \"keithley-6485\"\nbaud = 57600\n";
+        shutter = \"flood\"\n\n[photometer]\ndriver = \"keithley-6485\"\nbaud = 57600\nnplc = 0.025\n";
     few(Bench::small(), 20, 45)
         .with("plan.toml", "position_degree = 1", "position_degree = 0")
         .with("rig.toml", "readback = \"encoder\"", "readback = \"steps\"")

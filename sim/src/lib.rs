@@ -52,7 +52,7 @@ pub use grbl::GrblTwin;
 pub use mechanics::{
     AxisFlaws, EncoderError, Misalignment, MissedSteps, Ringing, SeenRay, Uncertain,
 };
-pub use meter::{MeterMake, MeterTwin};
+pub use meter::{MeterMake, MeterTwin, ScpiWords};
 pub use nominal::{Nominal, NominalAxis, NominalDetector, NominalGain, Quantity};
 pub use optics::Axis;
 pub use pty::Pty;

@@ -9,7 +9,7 @@ use super::setup::Stage;
 use super::simulated::wire;
 use crate::rig::{
     AXES, AxesDriver, AxesLink, Axis, AxisName, Devices, GrblOutput, PhotometerDriver, Rig,
-    ShutterServo,
+    ScpiTable, ShutterServo,
 };
 
 /// Room between an axis's travel and its switch: five degrees or millimetres.
@@ -40,6 +40,7 @@ impl Line {
             },
             Device::Meter(sim::MeterMake::Keithley6485) => "Keithley 6485",
             Device::Meter(sim::MeterMake::Newport1830C) => "Newport 1830-C",
+            Device::Meter(sim::MeterMake::Scpi(_)) => "meter as the rig file describes it",
             Device::Meter(sim::MeterMake::ThorlabsPm100) => "Thorlabs PM100D",
         }
     }
@@ -53,6 +54,7 @@ impl Line {
             },
             Device::Meter(sim::MeterMake::Keithley6485) => "keithley-6485",
             Device::Meter(sim::MeterMake::Newport1830C) => "newport-1830c",
+            Device::Meter(sim::MeterMake::Scpi(_)) => "scpi",
             Device::Meter(sim::MeterMake::ThorlabsPm100) => "thorlabs-pm100",
         }
     }
@@ -80,6 +82,7 @@ impl Line {
             Device::Meter(meter) => match meter {
                 sim::MeterMake::Keithley6485 => matches!(make, Make::Scpi | Make::Keithley),
                 sim::MeterMake::Newport1830C => matches!(make, Make::Newport),
+                sim::MeterMake::Scpi(_) => matches!(make, Make::Scpi),
                 sim::MeterMake::ThorlabsPm100 => matches!(make, Make::Scpi | Make::Thorlabs),
             },
         }
@@ -90,12 +93,27 @@ impl Line {
 pub(super) fn of(devices: &Devices) -> Vec<Line> {
     let axes = devices.axes.iter();
     let axes = axes.map(|link| Line { device: Device::Axes(link.clone()), baud: link.baud });
-    let meter = match devices.photometer.driver {
-        PhotometerDriver::Keithley(_) | PhotometerDriver::Scpi(_) => sim::MeterMake::Keithley6485,
+    let meter = match &devices.photometer.driver {
+        PhotometerDriver::Keithley(_) => sim::MeterMake::Keithley6485,
+        PhotometerDriver::Scpi(table) => sim::MeterMake::Scpi(Box::new(words(table))),
         PhotometerDriver::Newport(_) => sim::MeterMake::Newport1830C,
         PhotometerDriver::Thorlabs(_) => sim::MeterMake::ThorlabsPm100,
     };
     axes.chain([Line { device: Device::Meter(meter), baud: devices.photometer.baud }]).collect()
+}
+
+/// A table's words, for the instrument that speaks them.
+fn words(table: &ScpiTable) -> sim::ScpiWords {
+    sim::ScpiWords {
+        identity: table.identity.clone(),
+        ends_with_cr: table.ends_with_cr,
+        set_up: table.set_up.clone(),
+        zero: table.zero.clone(),
+        range: table.range.clone(),
+        read: table.read.clone(),
+        element: table.element,
+        has_error_queue: table.has_error_queue,
+    }
 }
 
 /// The devices that are asked for; all of the rig file's where none is. `None`: gonio's own
@@ -212,7 +230,7 @@ pub(super) fn bench(stage: &Stage, lines: &[Line], boot: u32) -> sim::Bench {
                 }
             },
             Device::Meter(make) => {
-                bench.plug(sim::MeterTwin::new(*make), wire);
+                bench.plug(sim::MeterTwin::new(make.clone()), wire);
             }
         }
     }

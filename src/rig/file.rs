@@ -13,7 +13,7 @@ use spanned_toml::{Bounds, Document, Problem, Source, Table};
 use super::alignment::Alignment;
 use super::axis::{Approach, Axis, Readback};
 use super::detector::{Adc, Detector, Gain, Quantity};
-use super::{AXES, AxisName, Devices, Link, Rig};
+use super::{AXES, AxisName, Devices, Link, PhotometerDriver, Rig};
 
 /// The rig behind `rig = "simulated"`.
 const BUILT_IN: &str = include_str!("simulated.toml");
@@ -24,6 +24,8 @@ const TRAVEL_MM_MAX: f64 = 10_000.0;
 /// Of an axis that nobody counts: a position within half a micrometre or microradian of where it
 /// stands is that one.
 const FIXED_COUNTS_PER_UNIT: f64 = 1e6;
+/// The faster of the world's power lines.
+const LINE_HZ_MAX: f64 = 60.0;
 const SETTLE_MS_MAX: f64 = 60_000.0;
 /// Gain ranges that a device can number.
 const GAINS_MAX: usize = 64;
@@ -52,6 +54,7 @@ impl Rig {
         let is_simulated = matches!(link, Link::Simulated { .. });
         let devices = Devices::read(&root, !is_simulated, detector.gains.len())?;
         check_devices(&root, &link, devices.as_ref(), &axes)?;
+        check_rate(&root, devices.as_ref(), detector.adc)?;
         if is_simulated {
             root.leave("simulated");
         } else if root.has("simulated") {
@@ -124,6 +127,25 @@ fn check_devices(
             ),
         )),
     }
+}
+
+/// A picoammeter gives no more readings a second than its integration leaves time for.
+fn check_rate(root: &Table<'_>, devices: Option<&Devices>, adc: Adc) -> Result<(), Problem> {
+    let Some(PhotometerDriver::Keithley(meter)) = devices.map(|devices| &devices.photometer.driver)
+    else {
+        return Ok(());
+    };
+    let cycles = meter.nplc * f64::from(meter.average);
+    let most = LINE_HZ_MAX / cycles;
+    if f64::from(adc.rate_hz) <= most * 1.001 {
+        return Ok(());
+    }
+    Err(root.problem(
+        "photometer",
+        &format!("{} readings a second of {cycles} power line cycles each", adc.rate_hz),
+        &format!("at most {most:.0} a second where the line has {LINE_HZ_MAX} Hz"),
+        "lower rate_hz of [detector.adc], or nplc or average of [photometer]",
+    ))
 }
 
 fn read_axes(table: &Table<'_>) -> Result<[Axis; 4], Problem> {

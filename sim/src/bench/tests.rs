@@ -9,7 +9,11 @@ use crate::{Scene, Shape, Simulated, Terms, compile};
 
 /// A rig whose θ moves 1000 counts a degree, over a patch of 40 W·m⁻²·sr⁻¹.
 pub(crate) fn board() -> SimulatedBoard {
-    let axis = |channel| NominalAxis {
+    board_of(axis, at_its_middle())
+}
+
+fn axis(channel: u8) -> NominalAxis {
+    NominalAxis {
         channel,
         home: 0.0,
         counts_per_unit: 1000.0,
@@ -21,13 +25,29 @@ pub(crate) fn board() -> SimulatedBoard {
         u_zero: 0.0,
         u_homing: 0.0,
         u_readback: 0.0,
-    };
-    // At boot it looks at the middle of the patch.
-    board_of(axis, Simulated { start: [Some(0.5); 4], ..Simulated::default() })
+    }
+}
+
+/// At boot it looks at the middle of the patch.
+fn at_its_middle() -> Simulated {
+    Simulated { start: [Some(0.5); 4], ..Simulated::default() }
 }
 
 /// A board with these axes over that patch.
 pub(crate) fn board_of(axis: impl Fn(u8) -> NominalAxis, simulated: Simulated) -> SimulatedBoard {
+    board_with(axis, simulated, 0.0)
+}
+
+/// The same board, one reading of whose converter has this noise, amperes.
+pub(crate) fn noisy_board(read_noise_a: f64) -> SimulatedBoard {
+    board_with(axis, at_its_middle(), read_noise_a)
+}
+
+fn board_with(
+    axis: impl Fn(u8) -> NominalAxis,
+    simulated: Simulated,
+    read_noise_a: f64,
+) -> SimulatedBoard {
     let nominal = Nominal {
         quantity: Quantity::Radiance,
         axes: [axis(0), axis(1), axis(2), axis(3)],
@@ -40,7 +60,7 @@ pub(crate) fn board_of(axis: impl Fn(u8) -> NominalAxis, simulated: Simulated) -
             u_spot_radius_m: 0.0,
             responsivity_a_per_w: 0.2,
             u_responsivity_relative: 0.0,
-            read_noise_a: 0.0,
+            read_noise_a,
             gains: vec![NominalGain { name: "1 uA".into(), full_scale_a: 1e-6, u_relative: 0.0 }],
             adc_bits: 24,
             adc_rate_hz: 2000,

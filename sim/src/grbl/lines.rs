@@ -65,7 +65,7 @@ impl GrblTwin {
         let is_at_rest = matches!(self.state, State::Idle | State::Alarm(_));
         match text {
             "" => {
-                self.say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]")
+                self.say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]");
             }
             "G" => self.list_modes(),
             _ if !is_at_rest => return Err(8),

@@ -1,13 +1,15 @@
 //! Light meters of other makes, simulated: each speaks its maker's words over a line and reads the
 //! board's photocurrent, with an offset of its own until that is taken off.
 //!
-//! What one reading integrates over is the board's own time of a reading, whatever is said of
-//! power line cycles. It shares no code with any driver and does not know the host.
+//! What one reading integrates over is the board's own time of a reading; a picoammeter's is as many
+//! power line cycles as it was told, on a line of 50 Hz. It shares no code with any driver and does
+//! not know the host.
 
 mod newport;
 mod picoammeter;
 mod power_meter;
 mod scpi;
+mod table;
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -15,18 +17,23 @@ use std::collections::VecDeque;
 use firmware_protocol::{Board as _, Illumination, Instant};
 
 use crate::{SimulatedBoard, Twin};
+pub use table::ScpiWords;
 
 /// Whose meter it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum MeterMake {
     /// A picoammeter of Keithley's, 6485.
     Keithley6485,
     /// An optical power meter of Newport's, 1830-C.
     Newport1830C,
+    /// Any that speaks what a table says.
+    Scpi(Box<ScpiWords>),
     /// A power meter of Thorlabs', PM100D, with a photodiode head.
     ThorlabsPm100,
 }
 
+/// Power line cycles a second.
+const LINE_HZ: f64 = 50.0;
 /// A line to a meter is this long at most; more is lost.
 const LINE_BYTES_MAX: usize = 512;
 /// What every reading is off by until it is taken off: more than a picoammeter's noise, less than
@@ -60,6 +67,8 @@ struct Settings {
     elements: &'static str,
     count: u32,
     average: u32,
+    /// How many conversions make a reading: as many while that filter is on.
+    conversions: u32,
     nplc: f64,
     zero_check: bool,
     zero_correct: bool,
@@ -77,6 +86,12 @@ struct Settings {
 /// Readings under way.
 #[derive(Debug)]
 struct Integrating {
+    /// Which reading it is, for what is drawn for it.
+    reading: u32,
+    pace: Pace,
+    /// The board's samples of the reading under way: how many, and what they add up to.
+    samples: u32,
+    sum: Option<f64>,
     next: Instant,
     left: u32,
     readings: Vec<(Option<f64>, Instant)>,
@@ -84,14 +99,44 @@ struct Integrating {
     is_asked: bool,
 }
 
+/// What a reading is made of.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    /// The board's samples.
+    samples: u32,
+    /// From one to the next.
+    step: Duration,
+    /// White noise beside theirs, where it is shorter than one: as a part of theirs, squared.
+    more_noise: f64,
+}
+
+impl Pace {
+    fn of(meter: &MeterTwin, board: &SimulatedBoard) -> Self {
+        let period = period(board);
+        let plain = Self { samples: 1, step: period, more_noise: 0.0 };
+        if meter.make != MeterMake::Keithley6485 {
+            return plain;
+        }
+        let settings = &meter.settings;
+        let seconds = settings.nplc * f64::from(settings.conversions) / LINE_HZ;
+        let ratio = seconds / period.as_secs_f64();
+        if ratio < 0.99 {
+            let step = Duration::from_secs_f64(seconds);
+            return Self { step, more_noise: 1.0 / ratio - 1.0, ..plain };
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
+        Self { samples: libm::round(ratio).max(1.0) as u32, ..plain }
+    }
+}
+
 impl MeterTwin {
     /// A meter that has just been switched on.
     pub fn new(make: MeterMake) -> Self {
         Self {
+            settings: Settings::at_power_up(&make),
             make,
             line: Vec::new(),
             said: Vec::new(),
-            settings: Settings::at_power_up(make),
             errors: VecDeque::new(),
             integrating: None,
             waiting: VecDeque::new(),
@@ -124,9 +169,10 @@ impl MeterTwin {
             return;
         }
         self.said.extend_from_slice(text.as_bytes());
-        self.said.extend_from_slice(match self.make {
+        self.said.extend_from_slice(match &self.make {
             MeterMake::Keithley6485 => b"\r",
-            MeterMake::Newport1830C | MeterMake::ThorlabsPm100 => b"\n",
+            MeterMake::Scpi(words) if words.ends_with_cr => b"\r",
+            _ => b"\n",
         });
     }
 
@@ -142,9 +188,10 @@ impl MeterTwin {
     }
 
     fn obey(&mut self, board: &mut SimulatedBoard, now: Instant, line: &str) {
-        match self.make {
+        match self.make.clone() {
             MeterMake::Keithley6485 => self.obey_as_picoammeter(board, now, line),
             MeterMake::Newport1830C => self.obey_as_newport(board, now, line),
+            MeterMake::Scpi(words) => self.obey_as_table(board, now, &words, line),
             MeterMake::ThorlabsPm100 => self.obey_as_power_meter(board, now, line),
         }
     }
@@ -161,20 +208,39 @@ impl MeterTwin {
         let illumination = Illumination { reading, gain, shutter: board.shutter() };
         board.prepare_dwell(now, illumination);
         board.begin_dwell(now, illumination);
-        let (next, left) = (now + period(board), self.settings.count.max(1));
-        self.integrating = Some(Integrating { next, left, readings: Vec::new(), is_asked });
+        let pace = Pace::of(self, board);
+        self.integrating = Some(Integrating {
+            reading,
+            pace,
+            samples: 0,
+            sum: Some(0.0),
+            next: now + pace.step,
+            left: self.settings.count.max(1),
+            readings: Vec::new(),
+            is_asked,
+        });
     }
 
-    /// One reading is over.
+    /// A sample is over, and perhaps a reading.
     fn take(&mut self, board: &mut SimulatedBoard) {
         let Some(mut integrating) = self.integrating.take() else { return };
         let gain = self.settings.gain.unwrap_or(0);
-        let value = self.measure(board, integrating.next, gain);
+        let sample = self.measure(board, integrating.next, gain);
+        integrating.sum = integrating.sum.zip(sample).map(|(sum, sample)| sum + sample);
+        integrating.samples += 1;
+        if integrating.samples < integrating.pace.samples {
+            integrating.next = integrating.next + integrating.pace.step;
+            self.integrating = Some(integrating);
+            return;
+        }
+        let more = shorter(board, &integrating);
+        let value = integrating.sum.map(|sum| sum / f64::from(integrating.samples) + more);
+        (integrating.samples, integrating.sum) = (0, Some(0.0));
         self.settings.last = value.unwrap_or(self.settings.last);
         integrating.readings.push((value, integrating.next));
         integrating.left -= 1;
         if integrating.left > 0 {
-            integrating.next = integrating.next + period(board);
+            integrating.next = integrating.next + integrating.pace.step;
             self.integrating = Some(integrating);
             return;
         }
@@ -199,9 +265,10 @@ impl MeterTwin {
     }
 
     fn readings_in_words(&self, readings: &[(Option<f64>, Instant)]) -> String {
-        let words = readings.iter().map(|(value, at)| match self.make {
+        let words = readings.iter().map(|(value, at)| match &self.make {
             MeterMake::Keithley6485 => self.picoammeter_words(*value, *at),
             MeterMake::Newport1830C => newport::words(*value),
+            MeterMake::Scpi(words) => words.answer(*value),
             MeterMake::ThorlabsPm100 => power_meter::words(*value),
         });
         words.collect::<Vec<_>>().join(",")
@@ -209,14 +276,15 @@ impl MeterTwin {
 }
 
 impl Settings {
-    fn at_power_up(make: MeterMake) -> Self {
+    fn at_power_up(make: &MeterMake) -> Self {
         Self {
             gain: None,
             elements: "READ,UNIT,TIME,STAT",
             count: 1,
-            average: if make == MeterMake::Keithley6485 { 10 } else { 1 },
+            average: if *make == MeterMake::Keithley6485 { 10 } else { 1 },
+            conversions: 1,
             nplc: 6.0,
-            zero_check: make == MeterMake::Keithley6485,
+            zero_check: *make == MeterMake::Keithley6485,
             zero_correct: false,
             correction: 0.0,
             last: 0.0,
@@ -227,6 +295,17 @@ impl Settings {
             attenuator: 0,
         }
     }
+}
+
+/// What a reading that is shorter than one of the board's has of noise beside it.
+fn shorter(board: &SimulatedBoard, integrating: &Integrating) -> f64 {
+    let more = integrating.pace.more_noise;
+    if more <= 0.0 {
+        return 0.0;
+    }
+    let sigma = board.nominal().detector.read_noise_a * libm::sqrt(more);
+    let key = integrating.readings.len() as u64;
+    sigma * crate::chance::draw(u64::from(integrating.reading), "short-integration", key)
 }
 
 /// The board's time of a reading.

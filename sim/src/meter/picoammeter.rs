@@ -73,7 +73,7 @@ impl MeterTwin {
         match (header, number) {
             ("*RST" | "SYST:PRES", _) => {
                 // A reset leaves zero check on, and the filter off.
-                *settings = Settings { average: 1, nplc: 1.0, ..Settings::at_power_up(self.make) };
+                *settings = Settings { average: 1, nplc: 1.0, ..Settings::at_power_up(&self.make) };
             }
             ("*CLS", _) => self.errors.clear(),
             ("FORM:ELEM", _) => {
@@ -102,11 +102,17 @@ impl MeterTwin {
             ("CURR:NPLC", Some(nplc)) if (0.01..=60.0).contains(&nplc) => settings.nplc = nplc,
             ("AVER:COUN", Some(count)) if (2.0..=100.0).contains(&count) => {
                 settings.average = whole(count);
+                if settings.conversions > 1 {
+                    settings.conversions = settings.average;
+                }
+            }
+            ("AVER" | "AVER:STAT", _) => {
+                settings.conversions = if is_on { settings.average } else { 1 };
             }
             (
-                "AVER" | "AVER:STAT" | "AVER:TCON" | "SYST:AZER" | "DISP:ENAB" | "FUNC" | "CONF"
-                | "CONF:CURR" | "ABOR" | "SYST:REM" | "SYST:LOC" | "ARM:COUN" | "ARM:SOUR"
-                | "TRIG:SOUR" | "TRIG:DEL" | "MED",
+                "AVER:TCON" | "SYST:AZER" | "DISP:ENAB" | "FUNC" | "CONF" | "CONF:CURR" | "ABOR"
+                | "SYST:REM" | "SYST:LOC" | "ARM:COUN" | "ARM:SOUR" | "TRIG:SOUR" | "TRIG:DEL"
+                | "MED",
                 _,
             ) => {}
             ("TRIG:COUN", Some(count)) if (1.0..=f64::from(READINGS_MAX)).contains(&count) => {

@@ -82,7 +82,7 @@ impl MeterTwin {
         let is_on = matches!(argument.to_ascii_uppercase().as_str(), "ON" | "1");
         let settings = &mut self.settings;
         match (header, number) {
-            ("*RST", _) => *settings = Settings::at_power_up(self.make),
+            ("*RST", _) => *settings = Settings::at_power_up(&self.make),
             ("*CLS", _) => self.errors.clear(),
             ("CONF" | "CONF:POW", _) => settings.is_power = true,
             ("CONF:CURR", _) => settings.is_power = false,
