@@ -26,7 +26,7 @@ mod words;
 const NAME: &str = "cost";
 const SEEDS: u64 = 5;
 const QUOTED_SEEDS: u64 = 20;
-/// The short study: one scene, and the first rungs that a fit takes too; nothing adaptive, which
+/// The short study: one scene, and the first rungs that all strategies take; nothing adaptive, which
 /// takes its own time.
 const SHORT: Scene = Scene::Gradient;
 const SHORT_RUNGS: usize = 2;
@@ -241,7 +241,7 @@ fn rungs(asked: &Asked, bench: &Bench<'_>, motion: Motion) -> Result<Vec<(Rung, 
     let ladder = ladder(motion, bench.scene() == Scene::Dim);
     let mut timed = Vec::new();
     for rung in ladder {
-        if asked.is_short && !(2..=3).contains(&rung.places) {
+        if asked.is_short && (rung.is_interleaved || !(2..=3).contains(&rung.places)) {
             continue;
         }
         let rig_s = bench.foretold_s(&rung)?;
