@@ -49,7 +49,7 @@ pub struct AxisFlaws {
     /// states.
     pub settle_s: Option<f64>,
     /// By how much the moments at which an encoder is latched in flight scatter, seconds: a standard
-    /// deviation, at least 0. `None`: as a latch does, [`LATCH_JITTER_S`].
+    /// deviation, at least 0. `None`: as a latch does, 3 µs.
     pub latch_jitter_s: Option<f64>,
 }
 
