@@ -234,6 +234,18 @@ fn all_that_was_tried_can_be_pinned() {
     }
 }
 
+/// Too few readings to leave any out. Were the penalty dropped, nothing would hold the splines.
+#[test]
+fn what_is_pinned_holds_where_nothing_can_be_chosen() {
+    let samples = noisy(&scattered(3, 3), FIELDS[3].1, 0.01, &mut Die::new(2));
+    let spans = Some(fit::Spans { theta: 4, phi: 8, fine: fit::Fine::NONE });
+    let wish = Wish { spans, penalty_strength: Some(1e-13), ..Wish::default() };
+    let (model, _) = fit::choose(&samples, &CONE, &wish, None).unwrap();
+    assert!(matches!(model.basis.angular, Angular::Splines { theta_spans: 4, phi_spans: 8, .. }));
+    assert!((model.penalty.strength / 1e-13 - 1.0).abs() < 1e-12, "{model:?}");
+    assert!(fit::fit(&samples, &CONE, model, &[]).is_ok());
+}
+
 #[test]
 fn of_pinned_splines_the_penalty_is_chosen() {
     let rays = raster_rays(&CONE, 21, 12, 1);

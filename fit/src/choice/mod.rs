@@ -16,7 +16,9 @@ mod wish;
 use crate::beam::Optics;
 use crate::check::check;
 use crate::grid::Grid;
-use crate::{Angular, BasisSpec, FitError, Penalised, Position, Ray, Region, Sample, sparse};
+use crate::{
+    Angular, BasisSpec, FitError, Penalised, Penalty, Position, Ray, Region, Sample, sparse,
+};
 use family::Trial;
 use search::Search;
 
@@ -96,7 +98,8 @@ pub fn choose(
         let smallest = smallest(region, 0, 0);
         let angular = wish.angular().unwrap_or(smallest.angular);
         let position = wish.position().unwrap_or(smallest.position);
-        return Ok((BasisSpec { angular, position }.into(), None));
+        let penalty = wish.penalty().unwrap_or(Penalty::NONE);
+        return Ok((Penalised::new(BasisSpec { angular, position }, penalty), None));
     };
     let truncation = truncation(&tried);
     let candidates = tried.iter().map(|(spec, trial)| Candidate {
