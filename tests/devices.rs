@@ -237,7 +237,7 @@ fn an_axis_that_no_device_moves_stands_where_the_rig_file_says() {
     let (_, after) = after.split_once("[detector]").unwrap();
     let fixed = "[axes.y]\nfixed_mm = 0\nu_zero_mm = 0.05\n\n[detector]";
     let own = own.having("rig.toml", format!("{before}{fixed}{after}"));
-    own.gonio(&run).refused(&["y is fixed, on a rig with one controller", "[[axes_link]]"]);
+    own.gonio(&run).refused(&["axes.y: y is fixed, on a rig with one controller", "[[axes_link]]"]);
 }
 
 /// The words of a table, for a meter that nobody here knows.

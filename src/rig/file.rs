@@ -84,9 +84,10 @@ fn check_devices(
 ) -> Result<(), Problem> {
     let Some(devices) = devices else {
         if let Some(axis) = axes.iter().find(|axis| axis.fixed.is_some()) {
-            return Err(root.problem(
-                "axes",
-                &format!("{} is fixed, on a rig with one controller", axis.name.name()),
+            let name = axis.name.name();
+            return Err(root.required_table("axes")?.problem(
+                name,
+                &format!("{name} is fixed, on a rig with one controller"),
                 "a fixed axis only where [[axes_link]] says who moves the others",
                 "describe how the controller moves it, or the devices that move the others",
             ));
