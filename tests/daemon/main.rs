@@ -13,6 +13,24 @@ use served::{Place, bundle, wait_until};
 /// Far below what the daemon grants clients that do not leave, on a machine that is busy.
 const AT_ONCE: Duration = Duration::from_secs(4);
 
+/// Axes on grbl, the photodiode on a picoammeter.
+const DEVICES: &str = "\
+[link]
+kind = \"simulated\"
+
+[[axes_link]]
+driver = \"grbl\"
+letters = { theta = \"X\", phi = \"Y\", x = \"Z\", y = \"A\" }
+zero_deg = { theta = -100, phi = -190 }
+zero_mm = { x = -55, y = -55 }
+shutter = \"flood\"
+
+[photometer]
+driver = \"keithley-6485\"
+baud = 57600
+nplc = 0.025
+";
+
 fn sequence_of(events: &[Value]) -> Vec<i64> {
     events.iter().map(|event| event["sequence"].as_i64().unwrap()).collect()
 }
@@ -328,6 +346,30 @@ fn an_idle_rig_is_driven_by_hand() {
     assert_eq!(status, 200, "{reading}");
     assert!(reading["mean_counts"].as_f64().unwrap() > 1000.0, "{reading}");
     assert_eq!(reading["n"], 40);
+}
+
+#[test]
+fn a_rig_of_other_makes_says_which_of_its_devices_stops_by_itself() {
+    let place = Place::new();
+    let own = "gonio's own controller: stops by itself when its lease ends";
+    assert_eq!(place.daemon().get("/status").1["watchdogs"], json!([own]));
+    let devices = place
+        .rig()
+        .replace("readback = \"encoder\"", "readback = \"steps\"")
+        .replace("full_scale_a = 1e-", "full_scale_a = 2e-")
+        .replace("[link]\nkind = \"simulated\"\nbaud = 1_000_000\n", DEVICES);
+    place.write("rig.toml", &devices);
+    let daemon = place.daemon();
+    let (status, answer) = daemon.get("/status");
+    assert_eq!(status, 200, "{answer}");
+    let watchdogs = ["grbl at a simulated port: no device watchdog"];
+    assert_eq!(answer["watchdogs"], json!(watchdogs), "{answer}");
+    // By hand it is driven as any other.
+    let (status, stands) = daemon.post("/rig/jog", "{\"theta_deg\": 30}");
+    assert_eq!(status, 200, "{stands}");
+    assert_eq!(daemon.get("/status").1["position_trusted"], true);
+    let (status, reading) = daemon.post("/rig/read", "{\"dwell_ms\": 20}");
+    assert_eq!(status, 200, "{reading}");
 }
 
 #[test]
