@@ -9,7 +9,7 @@ use crate::measured::Measured;
 use crate::parts::demand;
 use crate::{
     BasisSpec, BeamRows, Cause, CommonShift, FitError, Functional, Influence, Parts, Penalised,
-    Penalty, Ray, Region, Truncation, Weighed, sparse,
+    Penalty, Ray, Region, Weighed, sparse,
 };
 use radiometry::DomainError;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -196,13 +196,7 @@ impl Fit {
     /// cone it is extrapolated, and u says how little is known there. What the basis is known not to
     /// follow ([`Penalised::truncation`]) is in u.
     pub fn radiance(&self, ray: &Ray) -> Estimate {
-        let of_basis = self.estimate(&self.radiance_functional(ray));
-        let truncation = self.parts.model.truncation;
-        Estimate {
-            u: libm::hypot(of_basis.u, truncation),
-            u_independent: libm::hypot(of_basis.u_independent, truncation),
-            ..of_basis
-        }
+        self.estimate(&self.radiance_functional(ray))
     }
 
     /// The radiance along a ray without its uncertainty: for maps and comparisons of many rays.
@@ -247,7 +241,9 @@ impl Fit {
     }
 
     /// The intensity of the region as a whole in a direction: ∫ L cos θ dA, in the values' unit
-    /// times m²; of an object ∫ L dA over the plane across the direction.
+    /// times m²; of an object ∫ L dA over the plane across the direction. What the basis is known not
+    /// to follow may be the same in all places, so that its whole is in u, as for
+    /// [`radiance`](Self::radiance).
     pub fn intensity(&self, theta_rad: f64, phi_rad: f64) -> Estimate {
         let mean = self.estimate(&self.mean_towards(theta_rad, phi_rad));
         let is_whole = self.region().chart.is_whole_sphere();
@@ -286,15 +282,7 @@ impl Fit {
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.
     pub fn radiance_contributions(&self, ray: &Ray) -> Vec<Contribution> {
-        let mut budget = self.budget(&self.radiance_functional(ray));
-        let u = self.parts.model.truncation;
-        if u > 0.0 {
-            match budget.iter_mut().find(|row| row.name == TRUNCATION) {
-                Some(row) => row.u = libm::hypot(row.u, u),
-                None => budget.push(Contribution { name: TRUNCATION.to_owned(), u }),
-            }
-        }
-        budget
+        self.budget(&self.radiance_functional(ray))
     }
 
     /// One a function, in the order of [`names`](Self::names).
@@ -420,8 +408,9 @@ impl Fit {
     pub(crate) fn budget(&self, functional: &Functional) -> Vec<Contribution> {
         let independent = self.noise_variance(functional).sqrt();
         let mut budget = vec![Contribution { name: INDEPENDENT.to_owned(), u: independent }];
-        if self.parts.truncation.is_some() {
-            let u = self.missed_variance(functional).sqrt();
+        let missed = self.missed_variance(functional);
+        if self.parts.truncation.is_some() || missed > 0.0 {
+            let u = missed.sqrt();
             budget.push(Contribution { name: TRUNCATION.to_owned(), u });
         }
         let commons = budget.len();
@@ -445,8 +434,9 @@ impl Fit {
 
     /// By what the functions can't follow.
     fn missed_variance(&self, functional: &Functional) -> f64 {
-        let Some(Truncation { missed, .. }) = &self.parts.truncation else { return 0.0 };
-        missed.iter().map(|field| functional.times_field(field).powi(2)).sum()
+        let finer = functional.finer() * self.parts.model.truncation;
+        let missed = self.parts.truncation.iter().flat_map(|truncation| &truncation.missed);
+        missed.map(|field| functional.times_field(field).powi(2)).sum::<f64>() + finer * finer
     }
 
     fn common_shifts(&self, functional: &Functional) -> impl Iterator<Item = (&str, f64)> {

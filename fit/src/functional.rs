@@ -12,11 +12,30 @@ pub struct Functional {
     row: Vec<f64>,
     /// Over the functions beyond the fit's own, where it knows what it misses.
     beyond: Vec<f64>,
+    /// How much of what is finer than all functions is in it: see [`Functional::finer`].
+    finer: f64,
 }
 
 impl Functional {
     pub(crate) fn new(row: Vec<f64>, beyond: Vec<f64>) -> Self {
-        Self { row, beyond }
+        Self { row, beyond, finer: 0.0 }
+    }
+
+    /// The same, of one direction alone: with this share of what is finer than all functions.
+    pub(crate) fn with_finer(self, finer: f64) -> Self {
+        Self { finer: finer.abs(), ..self }
+    }
+
+    /// How much of what is finer than all functions ([`crate::Penalised::truncation`]) is in it, in the
+    /// unit of the weights. In one direction all of it, at however many places: it may be the same at
+    /// all of them. It is taken to be another in every direction, and to average out of sums over
+    /// several.
+    pub(crate) fn finer(&self) -> f64 {
+        self.finer
+    }
+
+    fn is_nothing(&self) -> bool {
+        self.row.iter().chain(&self.beyond).all(|element| *element == 0.0)
     }
 
     /// Of a field over the fit's functions and those beyond.
@@ -34,6 +53,7 @@ impl Functional {
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
         self.row.iter_mut().chain(&mut self.beyond).for_each(|element| *element *= factor);
+        self.finer *= factor.abs();
         self
     }
 
@@ -55,6 +75,11 @@ impl Functional {
     pub fn add(&mut self, factor: f64, other: &Self) {
         assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
         assert_eq!(self.beyond.len(), other.beyond.len(), "functionals of different fits");
+        self.finer = match (self.is_nothing(), other.is_nothing()) {
+            (_, true) => self.finer,
+            (true, false) => factor.abs() * other.finer,
+            (false, false) => 0.0,
+        };
         self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
         self.beyond.iter_mut().zip(&other.beyond).for_each(|(a, b)| *a += factor * b);
     }
@@ -110,13 +135,16 @@ impl Fit {
             let is_finite = [x_m, y_m, theta_rad, phi_rad, *weight].into_iter().all(f64::is_finite);
             assert!(is_finite, "not finite: {ray:?} of weight {weight}");
         }
-        self.functional(|basis| sum_over(basis, &rays))
+        let direction = |ray: &Ray| (ray.theta_rad.to_bits(), ray.phi_rad.to_bits());
+        let is_one = rays.windows(2).all(|two| direction(&two[0].0) == direction(&two[1].0));
+        let finer = if is_one { rays.iter().map(|(_, weight)| weight).sum() } else { 0.0 };
+        self.functional(|basis| sum_over(basis, &rays)).with_finer(finer)
     }
 
     /// The mean of the radiance over the region in a direction, as a functional. Times the region's
     /// area and cos θ it is the intensity.
     pub fn mean_towards(&self, theta_rad: f64, phi_rad: f64) -> Functional {
-        self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad))
+        self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad)).with_finer(1.0)
     }
 
     /// The flux in all directions of the chart, as a functional: from the region, through both

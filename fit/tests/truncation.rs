@@ -270,3 +270,36 @@ fn a_symmetry_stays_in_what_is_missed() {
     let sum = |all: &[(f64, f64)]| all.iter().skip(4).step_by(6).map(|(_, u)| u).sum::<f64>();
     assert!(sum(&with) < 1.01 * sum(&without), "{} {}", sum(&with), sum(&without));
 }
+
+#[test]
+fn what_is_finer_still_is_in_sums_of_one_direction_and_not_of_several() {
+    let mut die = Die::new(5);
+    // A step in θ, between rings that are closer than all functions of the wider model can follow.
+    let noise = Noise::Fixed { variance: SIGMA * SIGMA };
+    let sample = |ray: &Ray| {
+        let step = if ray.theta_rad < 0.8 { 1.0 } else { 0.2 };
+        Sample { ray: *ray, value: step + SIGMA * die.normal(), noise }
+    };
+    let samples: Vec<Sample> = raster_rays(&REGION, 40, 16, 1).iter().map(sample).collect();
+    let fit = plain(&samples, &[]).with_truncation(&samples, &[], &[], None).unwrap();
+    let finer = fit.model().truncation;
+    assert!(finer > 0.01, "{finer}");
+    let ray = |x_m: f64, theta_rad: f64| Ray { x_m, y_m: 0.0, theta_rad, phi_rad: 0.3 };
+    let one = fit.of(&fit.weighted_rays([(ray(0.0, 0.4), 1.0)]));
+    assert_eq!(one, fit.radiance(&ray(0.0, 0.4)));
+    // The same at all places of a field without position.
+    let places = [(ray(0.0, 0.4), 0.5), (ray(0.002, 0.4), 0.5)];
+    let mean = fit.of(&fit.weighted_rays(places));
+    assert!((mean.u - one.u).abs() < 1e-12 * one.u, "{} {}", mean.u, one.u);
+    let intensity = fit.intensity(0.4, 0.3);
+    let factor = REGION.area_m2() * libm::cos(0.4);
+    assert!((intensity.u - factor * one.u).abs() < 1e-9 * intensity.u);
+    // Of two directions less than of each, by as much at least as is finer.
+    let two = [(ray(0.0, 0.4), 0.5), (ray(0.0, 0.41), 0.5)];
+    let both = fit.of(&fit.weighted_rays(two)).u;
+    assert!(both * both + 0.8 * finer * finer < one.u * one.u, "{both} {} {finer}", one.u);
+    // The budget adds up to u.
+    let budget = fit.contributions_of(&fit.weighted_rays([(ray(0.0, 0.4), 1.0)]));
+    let squares: f64 = budget.iter().map(|part| part.u * part.u).sum();
+    assert!((squares.sqrt() - one.u).abs() < 1e-12 * one.u);
+}

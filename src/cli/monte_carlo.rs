@@ -93,10 +93,6 @@ impl Dice {
             offsets.push(side.map(|part| angle * part / length));
             for (k, number) in numbers.iter_mut().enumerate() {
                 match &number.functional {
-                    Some(functional) if k + 1 == highest => {
-                        let finer = trial.finer();
-                        number.trials.push(trial.of(functional) + finer);
-                    }
                     Some(functional) => number.trials.push(trial.of(functional)),
                     None if k == highest => number.trials.push(found.radiance),
                     None => {}

@@ -218,12 +218,12 @@ impl Trial<'_> {
             self.coefficients().len(),
             "a functional of another fit"
         );
-        functional.times_field(self.field)
+        functional.times_field(self.field) + functional.finer() * self.finer
     }
 
-    /// The radiance along a ray: with what is finer than all functions.
+    /// The radiance along a ray.
     pub fn radiance(&self, ray: &Ray) -> f64 {
-        self.of(&self.trials.fit.weighted_rays([(*ray, 1.0)])) + self.finer
+        self.of(&self.trials.fit.weighted_rays([(*ray, 1.0)]))
     }
 
     /// Where the field is largest: climbed to from all the tops of the fit's own field. A lobe that
@@ -242,11 +242,6 @@ impl Trial<'_> {
         };
         let (ray, radiance) = along(fit, &self.trials.tops, &mut value);
         TrialPeak { radiance: radiance + self.finer, ray }
-    }
-
-    /// What is finer than all functions, along any one ray: see [`crate::Penalised::truncation`].
-    pub fn finer(&self) -> f64 {
-        self.finer
     }
 
     /// The coefficients of the fit's own functions.
