@@ -25,14 +25,27 @@ use crate::report::{Cells, scores_svg};
 use crate::rig::Rig;
 use crate::run::OnFault;
 use crate::study::coverage::{
-    Cell, Drawn, Draws, FAMILIES, Family, Kind, Pool, Run, Scale, Score, Target, binomial_band,
-    demands, tally, targets,
+    Answer, Cell, Drawn, Draws, FAMILIES, Family, Kind, Lamp, Pool, Run, Scale, Score, Target,
+    binomial_band, demands, tally, targets,
 };
 
 /// The section's marks in the document, with pinned plans and with such as leave the basis open.
 const NAMES: [&str; 2] = ["coverage", "coverage-unpinned"];
-/// Of a real lamp; CC0 as its notice beside it says.
+/// Of a real lamp; MIT as the notice beside it says.
 pub(super) const PHOTOMETRIC: &str = include_str!("../../../examples/luminaire/ushio_b1.ies");
+/// Measured lamps, each with planes all round; MIT as the notice beside them says.
+const LAMPS: [&[u8]; 10] = [
+    include_bytes!("../../../photometry-files/tests/data/sterilray.ies"),
+    include_bytes!("../../../photometry-files/tests/data/aerolamp.ies"),
+    include_bytes!("../../../photometry-files/tests/data/beacon.ies"),
+    include_bytes!("../../../photometry-files/tests/data/lumenizer_zone.ies"),
+    include_bytes!("../../../photometry-files/tests/data/nukit_torch.ies"),
+    include_bytes!("../../../photometry-files/tests/data/ushio_b1.ies"),
+    include_bytes!("../../../photometry-files/tests/data/ushio_b1.5.ies"),
+    include_bytes!("../../../photometry-files/tests/data/uvpro222_b1.ies"),
+    include_bytes!("../../../photometry-files/tests/data/uvpro222_b2.ies"),
+    include_bytes!("../../../photometry-files/tests/data/visium.ies"),
+];
 /// Runs a scene of the short study.
 const SHORT_RUNS: usize = 12;
 /// Scenes of the short study: one that the basis follows, one that it does not.
@@ -134,6 +147,7 @@ fn study(
 ) -> Result<Studied, Failure> {
     let (seed, unpinned) = (args.seed, args.unpinned);
     let rig = Rig::built_in()?.document().source().text().to_owned();
+    let lamps = lamps();
     let entries: Vec<Entry> = (0..families.len())
         .flat_map(|family| (0..Scale::ALL.len()).map(move |scale| (family, scale)))
         .flat_map(|(family, scale)| (0..runs).map(move |run| Entry { family, scale, run }))
@@ -144,7 +158,7 @@ fn study(
         let place = FAMILIES.iter().position(|f| *f == family).unwrap_or(0);
         let mut draws = Draws::at(seed, &[place as u64, entry.scale as u64, entry.run as u64]);
         let folder = work.join(format!("{}-{}-{}", family.name(), entry.scale, entry.run));
-        let mut drawn = family.draw(&mut draws, scale, &rig, PHOTOMETRIC);
+        let mut drawn = family.draw(&mut draws, scale, &rig, &lamps);
         if unpinned {
             drawn = drawn.unpinned();
         }
@@ -183,6 +197,16 @@ fn study(
         pools.extend(pools_of(None, Scale::ALL[scale], &followed));
     }
     Ok(Studied { runs, seed, families, cells, pools, refused, unpinned })
+}
+
+/// The lamps of [`Family::Photometric`].
+fn lamps() -> Vec<Lamp> {
+    let lamp = |file: &&[u8]| {
+        // Ours, and part of the program.
+        let photometry = photometry_files::lm63::read(file).expect("a sound file");
+        Lamp::of(&photometry).expect("planes all round")
+    };
+    LAMPS.iter().map(lamp).collect()
 }
 
 /// The pools of one kind of rig, a quantity each.
@@ -232,7 +256,7 @@ fn scored(setup: &Setup, fit: &fit::Fit) -> Result<(Vec<Target>, Run), Failure> 
     let region = fit_region(setup);
     let truth = setup.truth().ok_or_else(|| Failure::midway("the rig is not simulated"))?;
     let exitance = truth.exitance();
-    let score = |target: &Target| -> Score {
+    let answer = |target: &Target| -> Answer {
         let (estimate, truth) = match (target.kind, target.ray) {
             (Kind::ExitanceWithin, _) => {
                 (fit.exitance_within_region(), truth.exitance_within_region())
@@ -248,11 +272,11 @@ fn scored(setup: &Setup, fit: &fit::Fit) -> Result<(Vec<Target>, Run), Failure> 
             }
             _ => (fit.exitance(), exitance),
         };
-        Score::of(estimate.value, estimate.u, truth)
+        Answer { kind: target.kind, value: estimate.value, u: estimate.u, truth }
     };
     let targets = targets(&region);
-    let scores = targets.iter().map(score).collect();
-    Ok((targets, Run { scores }))
+    let answers: Vec<Answer> = targets.iter().map(answer).collect();
+    Ok((targets, Run { scores: Score::of(&answers) }))
 }
 
 /// ∫ L cos θ dA over the region, of the truth.

@@ -137,7 +137,8 @@ pub(super) fn section(studied: &Studied, demands: &[Demand], document: &Document
         "## {title}\n\n{runs} runs of each of {} scenes, on rigs \
          that know their scale as a rig file states it, and exactly. Every run draws the scene's \
          numbers, the rig and its noise anew, and goes through the wire, the journal, the calibration \
-         and the fit as `gonio run` does. {basis}. An interval is value ± 1.96 u. Several rays of a \
+         and the fit as `gonio run` does. {basis}. An interval is value ± 1.96 u; u and errors are relative to the \
+         largest truth of their quantity in the run. Several rays of a \
          run share its errors.\n\n",
         families.len(),
     );

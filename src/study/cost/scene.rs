@@ -1,7 +1,7 @@
 //! The scenes, as files would have them. All fill the plan's region and more, so that no beam
 //! reaches beyond them.
 
-use super::super::coverage::{Attachment, ramp, scaled};
+use super::super::coverage::{Attachment, ramp};
 use crate::study::Fineness;
 
 /// What emits.
@@ -131,6 +131,19 @@ fn emitter(kind: &str, level: f64, keys: &str) -> String {
     format!("[[emitter]]\nkind = \"{kind}\"\n{OUTLINE}radiance_w_per_m2_sr = {level}\n{keys}")
 }
 
+/// A file in LM-63, its intensities such that the patch of [`OUTLINE`] has about this radiance along
+/// its normal: by the multiplier, the third number after the tilt.
+fn scaled(file: &str, level: f64) -> String {
+    let Some((head, tail)) = file.split_once("TILT=NONE") else { return file.to_owned() };
+    let tail = tail.trim_start();
+    let (numbers, rest) = tail.split_once('\n').unwrap_or((tail, ""));
+    let mut words: Vec<String> = numbers.split_whitespace().map(str::to_owned).collect();
+    if let Some(multiplier) = words.get_mut(2) {
+        *multiplier = (level * PATCH_M2 / INTENSITY_W_PER_SR).to_string();
+    }
+    format!("{head}TILT=NONE\n{}\n{rest}", words.join(" "))
+}
+
 /// At this radiance, W·m⁻²·sr⁻¹, 20 ms of the built-in rig have a noise of 0.1 %: 3.6e-11 A of
 /// light beside 3.2e-14 A of read noise and 1.7e-14 A of shot noise.
 const LEVEL: f64 = 6.8e-3;
@@ -138,6 +151,9 @@ const LEVEL: f64 = 6.8e-3;
 const LEVEL_DIM: f64 = 3e-4;
 
 const OUTLINE: &str = "x_mm = [-60, 60]\ny_mm = [-60, 60]\n";
+const PATCH_M2: f64 = 0.12 * 0.12;
+/// Of the photometric file along its normal.
+const INTENSITY_W_PER_SR: f64 = 0.1214;
 const BATWING: &str = "peak_theta_deg = 55\nvalley = 0.33\nsharpness = 3\n";
 const IMAGE: &str = "ramp.pgm";
 const TABLE: &str = "table.ies";
@@ -158,3 +174,15 @@ kind = "half-plane"
 x_max_mm = 0
 z_mm = 500
 "#;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_photometric_file_takes_another_level_by_its_multiplier() {
+        let file = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1.0 37 17\n1 1 15\n";
+        let scaled = scaled(file, INTENSITY_W_PER_SR / PATCH_M2 * 2.0);
+        assert!(scaled.contains("\n1 -1 2 37 17\n1 1 15\n"), "{scaled}");
+    }
+}

@@ -24,9 +24,9 @@ pub struct Tally {
     pub mean: f64,
     /// How many 95 % intervals hold the truth.
     pub covered: usize,
-    /// The median of u, relative to the truth.
+    /// The median of u, relative as in [`Score`].
     pub median_u: f64,
-    /// Root mean square of the error, relative to the truth.
+    /// Root mean square of the error, relative as in [`Score`].
     pub rms_error: f64,
 }
 

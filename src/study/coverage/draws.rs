@@ -57,11 +57,16 @@ impl Draws {
         }
     }
 
+    /// A whole number below a positive one, each as often.
+    pub fn below(&mut self, count: usize) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below the count
+        let place = (self.uniform() * count as f64) as usize;
+        place.min(count.saturating_sub(1))
+    }
+
     /// One of several, each as often.
     pub fn one_of<T: Copy, const N: usize>(&mut self, of: [T; N]) -> T {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below N
-        let place = (self.uniform() * N as f64) as usize;
-        of[place.min(N - 1)]
+        of[self.below(N)]
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Draws;
+use super::{Draws, Lamp};
 
 /// A kind of scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -21,7 +21,8 @@ pub enum Family {
     OffAxis,
     /// Brightest on a ring; drawn: level, the ring's angle, valley, sharpness.
     Batwing,
-    /// After a measured photometric file, interpolated between its angles; drawn: level.
+    /// After a measured photometric file, interpolated between its angles; drawn: the lamp, how far it
+    /// is turned about its axis, level.
     Photometric,
 }
 
@@ -114,8 +115,8 @@ impl Family {
     }
 
     /// One scene of it, seen by a rig of this description whose dark current is drawn too.
-    /// `photometric` is the file of [`Family::Photometric`].
-    pub fn draw(self, draws: &mut Draws, scale: Scale, rig: &str, photometric: &str) -> Drawn {
+    /// [`Family::Photometric`] is one of the lamps.
+    pub fn draw(self, draws: &mut Draws, scale: Scale, rig: &str, lamps: &[Lamp]) -> Drawn {
         let dark_a = draws.between(0.0, 2e-12);
         // Of the 10 nA range, which is full at a radiance of 1.9 on the built-in rig.
         let level = draws.log_between(0.03, 1.2);
@@ -140,7 +141,8 @@ impl Family {
                 emitter("batwing", level, &keys)
             }
             Self::Photometric => {
-                let bytes = scaled(photometric, level).into_bytes();
+                let lamp = &lamps[draws.below(lamps.len())];
+                let bytes = lamp.file(draws.uniform(), level, PATCH_M2).into_bytes();
                 attachments.push(Attachment { name: TABLE.to_owned(), bytes });
                 format!("[[emitter]]\nkind = \"photometric-file\"\nfile = \"{TABLE}\"\n{OUTLINE}")
             }
@@ -209,19 +211,6 @@ pub(in crate::study) fn ramp(slope: f64) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// A file in LM-63, its intensities such that the patch of [`OUTLINE`] has about this radiance along
-/// its normal: by the multiplier, the third number after the tilt.
-pub(in crate::study) fn scaled(file: &str, level: f64) -> String {
-    let Some((head, tail)) = file.split_once("TILT=NONE") else { return file.to_owned() };
-    let tail = tail.trim_start();
-    let (numbers, rest) = tail.split_once('\n').unwrap_or((tail, ""));
-    let mut words: Vec<String> = numbers.split_whitespace().map(str::to_owned).collect();
-    if let Some(multiplier) = words.get_mut(2) {
-        *multiplier = (level * PATCH_M2 / INTENSITY_W_PER_SR).to_string();
-    }
-    format!("{head}TILT=NONE\n{}\n{rest}", words.join(" "))
-}
-
 /// The rig's description with this dark current, and its scale as it shall be known.
 fn rig_text(rig: &str, scale: Scale, dark_a: f64) -> String {
     let key_of = |line: &str| line.split('=').next().map_or("", str::trim).to_owned();
@@ -246,8 +235,6 @@ const TABLE: &str = "table.ies";
 /// Wide enough that no beam reaches beyond it.
 const OUTLINE: &str = "x_mm = [-60, 60]\ny_mm = [-60, 60]\n";
 const PATCH_M2: f64 = 0.12 * 0.12;
-/// Of the photometric file along its normal.
-const INTENSITY_W_PER_SR: f64 = 0.1214;
 
 const SCALE_KEYS: [&str; 5] = [
     "u_distance_mm",
@@ -286,13 +273,14 @@ dwell_ms = 100
 
 #[cfg(test)]
 mod tests {
+    use super::super::lamp;
     use super::*;
 
     #[test]
     fn a_draw_repeats_and_another_differs() {
         for family in FAMILIES {
-            let draw =
-                |seed| family.draw(&mut Draws::new(seed), Scale::Known, "", "TILT=NONE\n1 2 3 4\n");
+            let lamps = [lamp::tests::lamp()];
+            let draw = |seed| family.draw(&mut Draws::new(seed), Scale::Known, "", &lamps);
             assert_eq!(draw(1), draw(1));
             let (one, other) = (draw(1), draw(2));
             let differ = one.scene != other.scene || one.attachments != other.attachments;
@@ -306,12 +294,5 @@ mod tests {
         let known = rig_text(rig, Scale::Known, 2e-12);
         assert_eq!(known, "u_distance_mm = 0\ndistance_mm = 300\ndark_current_a = 2e-12\n");
         assert!(rig_text(rig, Scale::AsStated, 0.0).contains("u_distance_mm = 0.3"));
-    }
-
-    #[test]
-    fn a_photometric_file_takes_another_level_by_its_multiplier() {
-        let file = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1.0 37 17\n1 1 15\n";
-        let scaled = scaled(file, INTENSITY_W_PER_SR / PATCH_M2 * 2.0);
-        assert!(scaled.contains("\n1 -1 2 37 17\n1 1 15\n"), "{scaled}");
     }
 }

@@ -6,11 +6,13 @@ mod band;
 mod demand;
 mod draws;
 mod family;
+mod lamp;
 mod target;
 
 pub use band::{binomial_band, rms_band};
 pub use demand::{Cell, Demand, Pool, SENSITIVE_RUNS, Tally, demands, tally};
 pub use draws::Draws;
+pub(super) use family::ramp;
 pub use family::{Attachment, Drawn, FAMILIES, Family, Scale};
-pub(super) use family::{ramp, scaled};
-pub use target::{Kind, Run, Score, Target, targets};
+pub use lamp::Lamp;
+pub use target::{Answer, Kind, Run, Score, Target, targets};

@@ -46,19 +46,40 @@ pub struct Target {
     pub ray: Option<Ray>,
 }
 
-/// An answer, relative to the truth.
+/// An answer, relative to the largest truth of its kind in the run: along a ray a lamp may be dark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// (value - truth) / truth.
+    /// (value - truth) / largest truth.
     pub error: f64,
-    /// u / truth.
+    /// u / largest truth.
     pub u: f64,
 }
 
+/// What a run says to a target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    /// What was asked.
+    pub kind: Kind,
+    /// What the fit says.
+    pub value: f64,
+    /// Its u.
+    pub u: f64,
+    /// What it should say.
+    pub truth: f64,
+}
+
 impl Score {
-    /// Of a value with its u.
-    pub fn of(value: f64, u: f64, truth: f64) -> Self {
-        Self { error: (value - truth) / truth, u: (u / truth).abs() }
+    /// Of all answers of one run.
+    pub fn of(answers: &[Answer]) -> Vec<Self> {
+        let largest = |kind: Kind| {
+            let truths = answers.iter().filter(|answer| answer.kind == kind);
+            truths.map(|answer| answer.truth.abs()).fold(0.0, f64::max)
+        };
+        let score = |answer: &Answer| {
+            let scale = largest(answer.kind);
+            Self { error: (answer.value - answer.truth) / scale, u: answer.u / scale }
+        };
+        answers.iter().map(score).collect()
     }
 
     /// The error in units of u.
@@ -104,4 +125,25 @@ pub fn targets(region: &Region) -> Vec<Target> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_along_a_dark_ray_is_relative_to_the_brightest_one() {
+        let of = |kind, value, truth| Answer { kind, value, u: 0.1, truth };
+        let answers = [
+            of(Kind::Exitance, 8.0, 4.0),
+            of(Kind::Radiance, 0.2, 0.0),
+            of(Kind::Radiance, 2.2, 2.0),
+        ];
+        let scores = Score::of(&answers);
+        let z: Vec<f64> = scores.iter().map(Score::z).collect();
+        let expected = [40.0, 2.0, 2.0];
+        assert!(z.iter().zip(expected).all(|(z, e)| (z - e).abs() < 1e-12), "{z:?}");
+        let errors: Vec<f64> = scores.iter().map(|score| score.error).collect();
+        assert!(errors.iter().zip([1.0, 0.1, 0.1]).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
 }
