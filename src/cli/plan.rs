@@ -63,6 +63,7 @@ fn as_text(
         ("settling", prediction.settling_s),
         ("dwelling", prediction.dwelling_s),
         ("dark and reference", prediction.checking_s),
+        ("overhead", prediction.overhead_s),
         ("rig time", prediction.total_s()),
     ];
     rows.extend(parts.map(|(name, seconds)| row(name, duration(seconds))));
@@ -206,6 +207,7 @@ fn as_json(
             "settling": prediction.settling_s,
             "dwelling": prediction.dwelling_s,
             "dark_and_reference": prediction.checking_s,
+            "overhead": prediction.overhead_s,
             "total": prediction.total_s(),
         },
     })

@@ -1,6 +1,7 @@
 //! What a sequence will cost in rig time, from the same profile of motion that the device runs.
 //!
-//! The wire costs nothing here: commands queue on the device, behind its motion.
+//! Commands cost nothing here: they queue on the device, behind its motion, or are short. What a
+//! meter says of many readings at once is not short.
 
 use std::time::Duration;
 
@@ -31,6 +32,8 @@ pub struct Prediction {
     pub dwelling_s: f64,
     /// Integrating dark and reference readings.
     pub checking_s: f64,
+    /// Waiting for the meter's words, of all readings.
+    pub overhead_s: f64,
 }
 
 /// The rig time of one step, coming from the one before it.
@@ -42,6 +45,8 @@ pub struct StepTime {
     pub settling_s: f64,
     /// Integrating.
     pub dwelling_s: f64,
+    /// Waiting for the meter's words: see [`Rig::answer_s`].
+    pub overhead_s: f64,
 }
 
 impl StepTime {
@@ -58,10 +63,12 @@ impl StepTime {
             Some(via) => rig.move_duration(from, via) + rig.move_duration(via, step.counts),
         };
         let adc = rig.detector.adc;
+        let readings = adc.readings_in(step.dwell);
         Self {
             moving_s: moving_s.as_secs_f64(),
             settling_s: route.settle.as_secs_f64(),
-            dwelling_s: f64::from(adc.readings_in(step.dwell)) / f64::from(adc.rate_hz),
+            dwelling_s: f64::from(readings) / f64::from(adc.rate_hz),
+            overhead_s: rig.answer_s(readings),
         }
     }
 
@@ -91,14 +98,15 @@ impl StepTime {
 
     /// The whole, seconds.
     pub fn total_s(&self) -> f64 {
-        self.moving_s + self.settling_s + self.dwelling_s
+        self.moving_s + self.settling_s + self.dwelling_s + self.overhead_s
     }
 }
 
 impl Prediction {
     /// The whole, seconds, without a warm-up, whose length is the source's to decide.
     pub fn total_s(&self) -> f64 {
-        self.homing_s + self.moving_s + self.settling_s + self.dwelling_s + self.checking_s
+        let still = self.settling_s + self.dwelling_s + self.checking_s + self.overhead_s;
+        self.homing_s + self.moving_s + still
     }
 
     /// Finding all home marks: see [`Prediction::homing_s`].
@@ -120,6 +128,7 @@ impl Prediction {
             let time = StepTime::of(rig, here, step);
             prediction.moving_s += time.moving_s;
             prediction.settling_s += time.settling_s;
+            prediction.overhead_s += time.overhead_s;
             match step.kind {
                 ReadingKind::Target { .. } => prediction.dwelling_s += time.dwelling_s,
                 _ => prediction.checking_s += time.dwelling_s,

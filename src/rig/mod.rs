@@ -64,6 +64,12 @@ impl Rig {
         matches!(self.link, Link::Simulated { .. })
     }
 
+    /// How long a meter of another make takes to tell so many readings, seconds; of gonio's own
+    /// controller, which tells their sum, nothing that counts.
+    pub fn answer_s(&self, readings: u32) -> f64 {
+        self.devices.as_ref().map_or(0.0, |devices| devices.answer_s(readings))
+    }
+
     /// Whether what a plan would take in flight is taken at rest: a meter of another make does not
     /// integrate while axes pass.
     pub fn takes_sweeps_at_rest(&self) -> bool {
