@@ -32,6 +32,36 @@ fn what_is_stated_covers_the_truth_with_and_without_the_scale() {
 }
 
 #[test]
+fn runs_that_were_kept_are_not_made_again_and_say_the_same() {
+    let bench = Bench::empty();
+    let words =
+        ["study", "coverage", "--scenes", "lambertian,photometric", "--runs", "2", "--json"];
+    let study = |out: &str, cache: &[&str]| {
+        let said = bench.gonio(&[&words[..], &["--out", out], cache].concat());
+        (said.json()["pools"].clone(), bench.text(&format!("{out}/coverage.csv")))
+    };
+    let made = study("made", &["--cache", "kept"]);
+    let kept = std::fs::read_dir(bench.path("kept")).unwrap().map(|file| file.unwrap().path());
+    let kept: Vec<_> = kept.collect();
+    // Two runs of each scene, on rigs of two kinds.
+    assert_eq!(kept.len(), 8);
+    assert_eq!(study("again", &["--cache", "kept"]), made);
+    assert_eq!(study("without", &[]), made);
+    // That they are taken from there: a run that says otherwise is believed.
+    for file in &kept {
+        let said = std::fs::read_to_string(file).unwrap();
+        let mut run: Value = serde_json::from_str(&said).unwrap();
+        run["scores"][0] = serde_json::json!([0.25, 0.125]);
+        std::fs::write(file, run.to_string()).unwrap();
+    }
+    let (pools, _) = study("believed", &["--cache", "kept"]);
+    let exitance = |pool: &&Value| pool["quantity"] == "exitance" && !pool["scene"].is_null();
+    for pool in pools.as_array().unwrap().iter().filter(exitance) {
+        assert_eq!(pool["rms_error_over_u"], 2.0, "{pool}");
+    }
+}
+
+#[test]
 fn what_makes_no_sense_is_refused_before_anything_is_run() {
     let bench = Bench::empty();
     let study = |words: &[&str]| bench.gonio(&[&["study", "coverage"], words].concat());

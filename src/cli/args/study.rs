@@ -86,6 +86,9 @@ pub(crate) struct CoverageArgs {
     /// A few runs of two scenes: seconds.
     #[arg(long)]
     pub(crate) short: bool,
+    /// Keep each run's scores here, and take from here what this same program found before.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
     /// The folder for coverage.csv and coverage.svg; must not be there yet. Default: coverage-UTC.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

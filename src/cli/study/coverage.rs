@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use radiometry::quadrature::gauss_legendre;
 
 use super::document::{Document, section, summary};
+use super::kept::{Scores, nothing_left, stopped};
 use crate::cli::acquire::{Acquired, Pace, acquire};
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
@@ -88,14 +89,11 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
         ));
     }
     let work = folder.join("runs");
-    std::fs::create_dir_all(&work)
-        .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
-    let made = folder.clone();
-    let clean = move || {
-        // Ours, and nothing in it is whole.
-        let _ = std::fs::remove_dir_all(made);
-    };
-    ends_when_stopped(clean, "stopped: nothing was written".to_owned())?;
+    for made in [Some(&work), args.cache.as_ref()].into_iter().flatten() {
+        std::fs::create_dir_all(made)
+            .map_err(|error| Failure::start(format!("{}: {error}", made.display())))?;
+    }
+    ends_when_stopped(nothing_left(&folder), stopped(args.cache.as_deref()))?;
     let studied = study(families, runs, args, &work)?;
     // Ours, and empty but for runs that were refused.
     let _ = std::fs::remove_dir_all(&work);
@@ -147,7 +145,7 @@ fn study(
 ) -> Result<Studied, Failure> {
     let (seed, unpinned) = (args.seed, args.unpinned);
     let rig = Rig::built_in()?.document().source().text().to_owned();
-    let lamps = lamps();
+    let (lamps, kept) = (lamps(), Scores::new(args.cache.as_deref())?);
     let entries: Vec<Entry> = (0..families.len())
         .flat_map(|family| (0..Scale::ALL.len()).map(move |scale| (family, scale)))
         .flat_map(|(family, scale)| (0..runs).map(move |run| Entry { family, scale, run }))
@@ -162,7 +160,7 @@ fn study(
         if unpinned {
             drawn = drawn.unpinned();
         }
-        run_one(&drawn, draws.seed(), &folder)
+        run_one(&drawn, draws.seed(), &folder, &kept)
             .map_err(|failure| format!("{}, run {}: {}", family.name(), entry.run, failure.text()))
     };
     let done = in_parallel(&entries, one);
@@ -225,7 +223,12 @@ fn pools_of(family: Option<Family>, scale: Scale, parts: &[(Vec<Target>, Vec<Run
 }
 
 /// One run of a scene as drawn, from the wire to the scores.
-fn run_one(drawn: &Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run), Failure> {
+fn run_one(
+    drawn: &Drawn,
+    seed: u64,
+    folder: &Path,
+    kept: &Scores<'_>,
+) -> Result<(Vec<Target>, Run), Failure> {
     let input = |role, name: &str, bytes: &[u8]| Input {
         role,
         name: name.to_owned(),
@@ -239,6 +242,9 @@ fn run_one(drawn: &Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run)
     let attached = drawn.attachments.iter();
     inputs.extend(attached.map(|a| input(InputRole::Attachment, &a.name, &a.bytes)));
     let setup = Setup::from_inputs(inputs, None, seed, EffectWishes::default())?;
+    if let Some(run) = kept.find(drawn, seed) {
+        return Ok((targets(&fit_region(&setup)), run));
+    }
     let acquired = acquire(&setup, Pace::Virtual, || {
         let (journal, _) = create(folder, &setup)?;
         Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
@@ -249,7 +255,9 @@ fn run_one(drawn: &Drawn, seed: u64, folder: &Path) -> Result<(Vec<Target>, Run)
     journal.close().map_err(Failure::midway)?;
     // Thousands of journals would fill a disk.
     let _ = std::fs::remove_dir_all(folder);
-    scored(&setup, &fit_of(&setup, &readings)?)
+    let (targets, run) = scored(&setup, &fit_of(&setup, &readings)?)?;
+    kept.keep(drawn, seed, &run)?;
+    Ok((targets, run))
 }
 
 fn scored(setup: &Setup, fit: &fit::Fit) -> Result<(Vec<Target>, Run), Failure> {

@@ -3,6 +3,7 @@
 mod cost;
 mod coverage;
 mod document;
+mod kept;
 
 pub(crate) use cost::cost;
 pub(crate) use coverage::coverage;

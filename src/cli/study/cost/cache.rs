@@ -27,17 +27,6 @@ pub(super) struct Key<'a> {
     pub(super) strategy: Strategy,
 }
 
-/// Names this build of the program, by its own file's bytes: what a run comes to depends on nearly all
-/// of them.
-pub(super) fn program() -> Result<String, Failure> {
-    let path = std::env::current_exe();
-    let bytes = path.and_then(std::fs::read);
-    let bytes = bytes.map_err(|error| {
-        Failure::start(format!("--cache: this program's own file can't be read: {error}"))
-    })?;
-    Ok(format!("{:016x}", fnv1a64([&bytes[..]])))
-}
-
 impl<'a> Cache<'a> {
     pub(super) const fn new(folder: Option<&'a Path>) -> Self {
         Self { folder }

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use self::cache::program;
 use self::one::Bench;
 use super::document::Document;
+use super::kept::{nothing_left, program, stopped};
 use crate::cli::args::CostArgs;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::halt::ends_when_stopped;
@@ -30,8 +30,6 @@ const QUOTED_SEEDS: u64 = 20;
 /// takes its own time.
 const SHORT: Scene = Scene::Gradient;
 const SHORT_RUNGS: usize = 2;
-/// A folder that something is put into is taken away so many times.
-const TRIES: u32 = 10;
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -85,31 +83,6 @@ pub(crate) fn cost(args: &CostArgs) -> Outcome {
     }
     let is_met = found.aims.iter().all(|aim| aim.is_met != Some(false));
     Ok(if is_met { ExitCode::SUCCESS } else { ExitCode::from(1) })
-}
-
-/// Takes away what a study that is stopped leaves in its folder, which was made for it: the same command
-/// shall find it as it was.
-fn nothing_left(folder: &Path) -> impl FnOnce() + Send + use<> {
-    let folder = folder.to_owned();
-    move || {
-        // Runs under way may put something there meanwhile.
-        for _ in 0..TRIES {
-            if std::fs::remove_dir_all(&folder).is_ok() || !folder.exists() {
-                break;
-            }
-        }
-    }
-}
-
-fn stopped(cache: Option<&Path>) -> String {
-    match cache {
-        Some(cache) => format!(
-            "stopped\n  help: the runs that were made are in {}: the same command goes on from there",
-            cache.display()
-        ),
-        None => "stopped\n  help: with --cache FOLDER runs are kept, and the same command goes on"
-            .to_owned(),
-    }
 }
 
 fn write(folder: &Path, found: &Found, svg: &str) -> Result<(), ExportError> {
