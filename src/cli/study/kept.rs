@@ -58,8 +58,7 @@ impl<'a> Scores<'a> {
         let seed = seed.to_le_bytes();
         let texts = [&self.program, &drawn.plan, &drawn.scene, &drawn.rig];
         let attached = drawn.attachments.iter().map(|attachment| &attachment.bytes[..]);
-        let parts =
-            texts.into_iter().map(|text| text.as_bytes()).chain([&seed[..]]).chain(attached);
+        let parts = texts.into_iter().map(String::as_bytes).chain([&seed[..]]).chain(attached);
         Some(self.folder?.join(format!("{:016x}.json", fnv1a64(parts))))
     }
 
