@@ -72,12 +72,14 @@ pub use undetermined::Cause;
 
 mod basis;
 mod beam;
+pub mod blocks;
 mod chart;
 mod check;
 mod choice;
 mod coverage;
 pub mod derive;
 mod error;
+mod excess;
 mod fitted;
 mod functional;
 mod grid;

@@ -147,13 +147,15 @@ fn carried(
     prior: &Prior,
 ) -> Result<Vec<CommonShift>, FitError> {
     let shifting: Vec<&Common> =
-        common.iter().copied().filter(|c| needs_a_side(c, design)).collect();
+        common.iter().copied().filter(|c| needs_a_side(c, design.holds_constant())).collect();
+    let constant = design.constant();
+    let constant = constant.as_deref();
     if shifting.is_empty() {
-        return Ok(shifts(common, &settled.coefficients, design, |side| solution.unknowns(side)));
+        return Ok(shifts(common, &settled.coefficients, constant, |side| solution.unknowns(side)));
     }
     let sides = sensitivities(design, settled, &shifting)?;
     let carried = solve_readings(design, &settled.variances, &sides, prior)?;
-    Ok(shifts(common, &settled.coefficients, design, |side| carried.unknowns(side)))
+    Ok(shifts(common, &settled.coefficients, constant, |side| carried.unknowns(side)))
 }
 
 fn check_fields(samples: &[Sample], fields: &[Vec<f64>]) -> Result<(), FitError> {

@@ -18,7 +18,9 @@ use crate::penalty::{Penalised, Prior};
 use crate::readings::{Readings, Weighed};
 use crate::triangle::{Solution, Triangle};
 use crate::weights::{Model, Settled, settle};
-use crate::{Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, sparse, undetermined};
+use crate::{
+    BeamRows, Common, FitError, Influence, Noise, Ray, Region, Sample, Shift, sparse, undetermined,
+};
 
 /// Fits the field to samples: the crate's description has the method and an example.
 ///
@@ -104,13 +106,16 @@ pub fn fit_readings(
     let (common, jitters): (Vec<&Common>, Vec<&Common>) =
         common.iter().partition(|common| common.shift.is_shared());
     let settled = settle(&design, &prior, readings, &jitters)?;
-    let needs_a_side = |common: &Common| needs_a_side(common, &design);
+    let holds_constant = design.holds_constant();
+    let needs_a_side = |common: &Common| needs_a_side(common, holds_constant);
     let shifting: Vec<&Common> = common.iter().copied().filter(|c| needs_a_side(c)).collect();
     let sides = sensitivities(&design, &settled, &shifting)?;
     let solved = solve(&design, &settled.rows(), &sides, &prior)?;
     let solution = &solved.field;
     let coefficients = solution.unknowns(0);
-    let mut shifts = shifts(&common, &coefficients, &design, |side| solution.unknowns(side));
+    let constant = design.constant();
+    let mut shifts =
+        shifts(&common, &coefficients, constant.as_deref(), |side| solution.unknowns(side));
     let own: Vec<Vec<f64>> =
         (0..nuisances.len()).map(|k| solution.unknowns(1 + sides.len() + k)).collect();
     let inverse = solution.inverse_matrix();
@@ -181,8 +186,16 @@ pub(crate) fn weighed(
     settled: &Settled,
     nuisances: Vec<crate::FittedNuisance>,
 ) -> Weighed {
-    let model = Model::of(readings.samples);
-    let shrink = settled.shrink();
+    weighed_by(readings, settled, nuisances, (Model::of(readings.samples), settled.shrink()))
+}
+
+/// The same of a part of all samples, by what is known of all.
+pub(crate) fn weighed_by(
+    readings: &Readings<'_>,
+    settled: &Settled,
+    nuisances: Vec<crate::FittedNuisance>,
+    (model, shrink): (Model, f64),
+) -> Weighed {
     let residuals = readings.samples.iter().zip(settled.expected()).enumerate();
     let residuals = residuals.map(|(i, (sample, expected))| {
         let stated = model.variance(sample.noise, settled.levels[i]) + settled.moved[i];
@@ -255,11 +268,16 @@ pub(crate) fn solve(
     sides: &[Vec<f64>],
     prior: &Prior,
 ) -> Result<Solved, FitError> {
-    let triangle = triangle(design, rows, sides)?;
-    let nuisances = rows.columns.len();
-    Solved::of(triangle, nuisances, |field| {
-        prior.absorb_into(field, 1 + sides.len() + nuisances);
-    })
+    solved(triangle(design, rows, sides)?, (rows.columns.len(), sides.len()), prior)
+}
+
+/// What a triangle of all rows determines, which has columns of so many nuisances and so many sides.
+pub(crate) fn solved(
+    triangle: Triangle,
+    (nuisances, sides): (usize, usize),
+    prior: &Prior,
+) -> Result<Solved, FitError> {
+    Solved::of(triangle, nuisances, |field| prior.absorb_into(field, 1 + sides + nuisances))
 }
 
 /// What the samples' own values determine under these variances.
@@ -274,23 +292,40 @@ pub(crate) fn solve_readings(
     Ok(solve(design, &rows, sides, prior)?.field)
 }
 
-/// One pass of all rows, each divided by its standard uncertainty. `sides` are further right-hand
-/// sides, one vector over the samples each.
+/// One pass of all rows. `sides` are further right-hand sides, one vector over the samples each.
 fn triangle(
     design: &Design<'_>,
     rows: &Rows<'_>,
     sides: &[Vec<f64>],
 ) -> Result<Triangle, FitError> {
-    let (q, p, s) = (rows.columns.len(), design.basis().len(), sides.len());
+    let mut triangle = begun(rows.columns.len(), design.basis().len(), sides.len());
+    absorb(&mut triangle, design, rows, sides)?;
+    Ok(triangle)
+}
+
+/// The triangle of no sample yet: the priors of so many nuisances.
+pub(crate) fn begun(nuisances: usize, coefficients: usize, sides: usize) -> Triangle {
+    let (q, p, s) = (nuisances, coefficients, sides);
     let mut triangle = Triangle::new(q + p, 1 + s + q);
-    let mut room = design.room();
     let mut row = vec![0.0; q + p + 1 + s + q];
     for k in 0..q {
         row.fill(0.0);
         (row[k], row[q + p + 1 + s + k]) = (1.0, 1.0);
         triangle.absorb(&row);
     }
-    row.fill(0.0);
+    triangle
+}
+
+/// Takes the rows of samples in, each divided by its standard uncertainty.
+pub(crate) fn absorb(
+    triangle: &mut Triangle,
+    design: &Design<'_>,
+    rows: &Rows<'_>,
+    sides: &[Vec<f64>],
+) -> Result<(), FitError> {
+    let (q, p, s) = (rows.columns.len(), design.basis().len(), sides.len());
+    let mut room = design.room();
+    let mut row = vec![0.0; q + p + 1 + s + q];
     for (i, (value, variance)) in rows.values.iter().zip(rows.variances).enumerate() {
         if *variance == f64::INFINITY {
             continue;
@@ -313,16 +348,16 @@ fn triangle(
         }
         triangle.absorb(&row);
     }
-    Ok(triangle)
+    Ok(())
 }
 
 /// Whether a component's effect has to go through the factorisation. A scale and an offset don't:
 /// the fit is linear and holds the constant, so that their effect on the coefficients is known;
 /// only that an offset of beams that are cut is no constant field.
-pub(crate) fn needs_a_side(common: &Common, design: &Design<'_>) -> bool {
+pub(crate) fn needs_a_side(common: &Common, holds_constant: bool) -> bool {
     match common.shift {
         Shift::Scale | Shift::Jitter(_) => false,
-        Shift::Offset => !design.holds_constant(),
+        Shift::Offset => !holds_constant,
         Shift::Ray(_) | Shift::Value(_) | Shift::Beam(_) => true,
     }
 }
@@ -368,20 +403,19 @@ pub(crate) fn sensitivities(
 }
 
 /// The coefficients' shift by one u of each component, in the order handed in; `unknowns` are those of
-/// a side, of which the first is the values'.
+/// a side, of which the first is the values'. `constant` is the field of 1, where that is what an
+/// offset looks like.
 pub(crate) fn shifts(
     common: &[&Common],
     coefficients: &[f64],
-    design: &Design<'_>,
+    constant: Option<&[f64]>,
     unknowns: impl Fn(usize) -> Vec<f64>,
 ) -> Vec<CommonShift> {
     let mut side = 0;
-    let mut shift = |c: &Common| match c.shift {
-        Shift::Scale => coefficients.iter().map(|value| c.u * value).collect(),
-        Shift::Offset if design.holds_constant() => {
-            design.basis().unity().iter().map(|value| c.u * value).collect()
-        }
-        Shift::Offset | Shift::Ray(_) | Shift::Jitter(_) | Shift::Value(_) | Shift::Beam(_) => {
+    let mut shift = |c: &Common| match (&c.shift, constant) {
+        (Shift::Scale, _) => coefficients.iter().map(|value| c.u * value).collect(),
+        (Shift::Offset, Some(constant)) => constant.iter().map(|value| c.u * value).collect(),
+        _ => {
             side += 1;
             unknowns(side)
         }
@@ -395,30 +429,59 @@ pub(crate) fn quality(
     settled: &Settled,
     limits: &[usize],
 ) -> Quality {
-    let (samples, excess) = (design.samples(), settled.excess);
-    let model = Model::of(samples);
-    let kept = settled.kept(limits);
-    let (mut squares, mut chi2) = (0.0, 0.0);
-    for (i, (sample, expected)) in samples.iter().zip(settled.expected()).enumerate() {
-        let weight = settled.weights[i];
-        if weight == 0.0 || limits.binary_search(&i).is_ok() {
-            continue;
+    let mut sums = QualitySums::default();
+    sums.take(design, settled, limits, Model::of(design.samples()));
+    sums.quality(condition, settled.determined, settled.excess)
+}
+
+/// What tells how good a fit is, summed over samples.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct QualitySums {
+    squares: f64,
+    chi2: f64,
+    /// Samples that say what they read, and those that have any weight.
+    kept: usize,
+    used: usize,
+    beam: Option<BeamRows>,
+}
+
+impl QualitySums {
+    pub(crate) fn take(
+        &mut self,
+        design: &Design<'_>,
+        settled: &Settled,
+        limits: &[usize],
+        model: Model,
+    ) {
+        let (samples, excess) = (design.samples(), settled.excess);
+        for (i, (sample, expected)) in samples.iter().zip(settled.expected()).enumerate() {
+            let weight = settled.weights[i];
+            if weight == 0.0 || limits.binary_search(&i).is_ok() {
+                continue;
+            }
+            let square = (sample.value - expected).powi(2);
+            let unstated = if sample.noise == Noise::Unknown { excess } else { 0.0 };
+            let stated = model.variance(sample.noise, settled.levels[i]) + settled.moved[i];
+            self.squares += square;
+            self.chi2 += weight * square / (stated + unstated);
         }
-        let square = (sample.value - expected).powi(2);
-        let unstated = if sample.noise == Noise::Unknown { excess } else { 0.0 };
-        let stated = model.variance(sample.noise, settled.levels[i]) + settled.moved[i];
-        squares += square;
-        chi2 += weight * square / (stated + unstated);
+        self.kept += settled.kept(limits);
+        self.used += settled.weights.iter().filter(|weight| **weight > 0.0).count();
+        let rows = design.rows(&settled.variances);
+        self.beam = self.beam.map_or(rows, |beam| rows.map(|rows| beam.and(rows)));
     }
-    Quality {
-        condition,
-        n_used: settled.weights.iter().filter(|weight| **weight > 0.0).count(),
-        dof: left_over(kept, settled.determined),
-        determined: settled.determined,
-        residual_rms: (squares / kept.max(1) as f64).sqrt(),
-        chi2,
-        excess_rms: excess.sqrt(),
-        beam: design.rows(&settled.variances),
+
+    pub(crate) fn quality(&self, condition: f64, determined: f64, excess: f64) -> Quality {
+        Quality {
+            condition,
+            n_used: self.used,
+            dof: left_over(self.kept, determined),
+            determined,
+            residual_rms: (self.squares / self.kept.max(1) as f64).sqrt(),
+            chi2: self.chi2,
+            excess_rms: excess.sqrt(),
+            beam: self.beam,
+        }
     }
 }
 

@@ -270,6 +270,19 @@ fn spectrum(
     triangle.solve()?.spectrum()
 }
 
+/// Where the rays are forgotten only the functions can be named.
+pub(crate) fn by_functions(spectrum: &Spectrum, name: impl Fn(usize) -> String) -> FitError {
+    let shares = spectrum.undetermined_shares();
+    let mut by_share: Vec<usize> = (0..shares.len()).collect();
+    by_share.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]).then(a.cmp(b)));
+    FitError::Undetermined {
+        rank: spectrum.rank(),
+        coefficients: shares.len(),
+        causes: Vec::new(),
+        functions: by_share.into_iter().take(NAMES_MAX).map(name).collect(),
+    }
+}
+
 /// A basis function, which is of order 1, vanishes on the rays where it stays below this.
 const ROUNDING: f64 = 1e-12;
 /// Most functions that are named.

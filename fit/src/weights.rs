@@ -9,10 +9,10 @@
 //! residuals are as large as they should be (Paule & Mandel 1982, J. Res. NBS 87, 377).
 
 use crate::beam::design::Design;
+use crate::excess::{Scatter, cut_excess, excess};
 use crate::limit;
 use crate::penalty::Prior;
 use crate::readings::Readings;
-use crate::robust::{CUT_SIGMA, cut_square};
 use crate::solve::{Rows, levels, sensitivities, solve};
 use crate::{Common, FitError, Noise, Robust, Sample, Shift, undetermined};
 
@@ -93,9 +93,21 @@ pub(crate) fn settle(
 /// Before anything is fitted every sample is taken to lie at the mean of all.
 pub(crate) fn start(readings: &Readings<'_>, model: Model) -> Settled {
     let samples = readings.samples;
+    let mean = samples.iter().map(|s| s.value / samples.len() as f64).sum::<f64>();
+    start_at(readings, model, mean, has_unknown(samples))
+}
+
+/// The same of a part of all samples, whose mean is known; `is_unknown`: the noise of some is left to
+/// the residuals.
+pub(crate) fn start_at(
+    readings: &Readings<'_>,
+    model: Model,
+    mean: f64,
+    is_unknown: bool,
+) -> Settled {
+    let samples = readings.samples;
     let n = samples.len();
-    let mean = samples.iter().map(|s| s.value / n as f64).sum::<f64>();
-    let excess = if has_unknown(samples) { model.mean_square } else { 0.0 };
+    let excess = if is_unknown { model.mean_square } else { 0.0 };
     let mut start = Settled {
         coefficients: Vec::new(),
         levels: vec![mean; n],
@@ -160,7 +172,7 @@ impl Settled {
     /// The variance of a residual over that of its sample: on average the coefficients take as much of
     /// it as there are coefficients for a sample.
     pub(crate) fn shrink(&self) -> f64 {
-        (1.0 - self.determined / self.levels.len() as f64).max(SHRINK_MIN)
+        shrink(self.determined, self.levels.len())
     }
 
     /// The weights by this fit; whether they are about as they were.
@@ -170,22 +182,36 @@ impl Settled {
         model: Model,
         robust: Robust,
     ) -> bool {
+        let terms = self.terms(readings, model);
+        let dof = (terms.len() as f64 - self.determined).max(0.0);
+        self.excess = excess_by(&terms, dof, has_unknown(readings.samples), robust);
+        self.weigh(readings, model, robust, self.shrink()) < SETTLED_RELATIVE
+    }
+
+    /// The squared residual and the stated variance of the samples that say what they read.
+    pub(crate) fn terms(&self, readings: &Readings<'_>, model: Model) -> Vec<(f64, f64)> {
+        let (samples, limits) = (readings.samples, readings.limits);
+        let expected = self.expected();
+        let stated = model.variances(samples, self);
+        (0..samples.len())
+            .filter(|i| self.weights[*i] > 0.0 && limits.binary_search(i).is_err())
+            .map(|i| ((samples[i].value - expected[i]).powi(2), stated[i]))
+            .collect()
+    }
+
+    /// The weights under the excess that is known; by how much the largest change of them changes.
+    pub(crate) fn weigh(
+        &mut self,
+        readings: &Readings<'_>,
+        model: Model,
+        robust: Robust,
+        shrink: f64,
+    ) -> f64 {
         let (samples, limits) = (readings.samples, readings.limits);
         let expected = self.expected();
         let stated = model.variances(samples, self);
         let is_limit = |i: usize| limits.binary_search(&i).is_ok();
-        let terms: Vec<(f64, f64)> = (0..samples.len())
-            .filter(|i| self.weights[*i] > 0.0 && !is_limit(*i))
-            .map(|i| ((samples[i].value - expected[i]).powi(2), stated[i]))
-            .collect();
-        let dof = (terms.len() as f64 - self.determined).max(0.0);
-        let is_unknown = has_unknown(samples);
-        self.excess = if robust == Robust::None {
-            excess(&terms, dof, is_unknown)
-        } else {
-            cut_excess(&terms, dof, is_unknown)
-        };
-        let (mut change, shrink) = (0.0_f64, self.shrink());
+        let mut change = 0.0_f64;
         for (i, stated) in stated.into_iter().enumerate() {
             let variance = stated + self.excess;
             let (old_variance, old_value) = (self.variances[i], self.values[i]);
@@ -212,7 +238,21 @@ impl Settled {
                 if self.weights[i] > 0.0 { stated / self.weights[i] } else { f64::INFINITY };
             change = change.max((self.weights[i] - old_weight).abs());
         }
-        change < SETTLED_RELATIVE
+        change
+    }
+}
+
+/// See [`Settled::shrink`].
+pub(crate) fn shrink(determined: f64, samples: usize) -> f64 {
+    (1.0 - determined / samples as f64).max(SHRINK_MIN)
+}
+
+/// The scatter beyond what is stated, outliers weighed like this.
+pub(crate) fn excess_by(terms: &impl Scatter, dof: f64, is_unknown: bool, robust: Robust) -> f64 {
+    if robust == Robust::None {
+        excess(terms, dof, is_unknown)
+    } else {
+        cut_excess(terms, dof, is_unknown)
     }
 }
 
@@ -253,8 +293,16 @@ pub(crate) struct Model {
 impl Model {
     pub(crate) fn of(samples: &[Sample]) -> Self {
         let n = samples.len() as f64;
-        let mean_square = samples.iter().map(|s| s.value * s.value / n).sum::<f64>();
+        Self::of_mean_square(samples.iter().map(|s| s.value * s.value / n).sum::<f64>())
+    }
+
+    /// Of samples of which no more is known.
+    pub(crate) fn of_mean_square(mean_square: f64) -> Self {
         Self { mean_square: if mean_square > 0.0 { mean_square } else { 1.0 } }
+    }
+
+    pub(crate) fn mean_square(self) -> f64 {
+        self.mean_square
     }
 
     /// The stated variance of a sample whose fitted level is this. Where nothing is stated it is
@@ -283,67 +331,6 @@ impl Model {
     }
 }
 
-/// The variance τ² that, added to the stated ones, makes Σ r²/(v + τ²) equal the dof (samples less
-/// what they determine: what a penalty smooths away is in the posterior, not counted here twice); 0 where the
-/// stated noise explains the residuals. `terms` are r² and v.
-fn excess(terms: &[(f64, f64)], dof: f64, is_unknown: bool) -> f64 {
-    let sum = |tau2: f64, power: i32| -> f64 {
-        terms.iter().map(|(r2, v)| r2 / (v + tau2).powi(power)).sum()
-    };
-    let threshold = if is_unknown { dof } else { threshold(dof) };
-    if dof <= 0.0 || sum(0.0, 1) <= threshold {
-        return 0.0;
-    }
-    // Newton's method on 1/Σ, which is concave and rising: from 0 it rises to the root.
-    let mut tau2 = 0.0;
-    for _ in 0..NEWTON_MAX {
-        let s = sum(tau2, 1);
-        let step = (1.0 / dof - 1.0 / s) * s * s / sum(tau2, 2);
-        tau2 += step;
-        if step <= NEWTON_RELATIVE * tau2 {
-            break;
-        }
-    }
-    tau2
-}
-
-/// The same by residuals that are cut off where Huber's weight begins to fall: a few large ones say
-/// nothing of the scatter of the others.
-fn cut_excess(terms: &[(f64, f64)], dof: f64, is_unknown: bool) -> f64 {
-    let n = terms.len() as f64;
-    if dof <= 0.0 {
-        return 0.0;
-    }
-    let sum = |tau2: f64| -> f64 {
-        terms.iter().map(|(r2, v)| cut_square(r2 / (v + tau2) * n / dof)).sum()
-    };
-    let threshold = if is_unknown { n } else { n + EXCESS_SIGMA * CUT_SIGMA * n.sqrt() };
-    if sum(0.0) <= threshold {
-        return 0.0;
-    }
-    // The sum falls as τ² rises. At the largest residual's square it is below n.
-    let mut high = terms.iter().map(|(r2, _)| r2 * n / dof).fold(0.0, f64::max) * 2.0;
-    let mut low = 0.0;
-    for _ in 0..BISECTIONS {
-        // By ratio once there is one: τ² may be anything between rounding and the largest residual.
-        let middle = if low > 0.0 { (low * high).sqrt() } else { high / 16.0 };
-        if sum(middle) > n {
-            low = middle;
-        } else {
-            high = middle;
-        }
-        if low > 0.0 && high / low - 1.0 < NEWTON_RELATIVE {
-            break;
-        }
-    }
-    high
-}
-
-/// The chi² beyond which residuals of so many degrees of freedom are larger than the stated noise.
-pub(crate) fn threshold(dof: f64) -> f64 {
-    dof + EXCESS_SIGMA * (2.0 * dof).sqrt()
-}
-
 /// What a sample's uncertainty is taken for where only its size matters.
 const UNSTATED_RELATIVE: f64 = 1e-3;
 /// More passes than a fit with weights that settle needs (2 to 4).
@@ -352,14 +339,6 @@ pub(crate) const PASSES_MAX: usize = 8;
 pub(crate) const REWEIGHING_MAX: usize = 40;
 /// Weights are settled when no variance changes by more: the fit is stationary against its
 /// weights, so that what is left is of second order.
-const SETTLED_RELATIVE: f64 = 0.01;
-/// The excess is taken for real beyond this many standard deviations of chi².
-const EXCESS_SIGMA: f64 = 3.0;
+pub(crate) const SETTLED_RELATIVE: f64 = 0.01;
 /// A residual is not taken for smaller than this part of its sample's variance would make it.
 const SHRINK_MIN: f64 = 0.05;
-/// From the largest residual down to rounding in steps of 16, then by halving the ratio.
-const BISECTIONS: usize = 120;
-/// More steps than Newton's method needs from any start.
-const NEWTON_MAX: usize = 60;
-/// The excess is as exact as this.
-const NEWTON_RELATIVE: f64 = 1e-6;

@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use fit::blocks::Asked;
 use fit::{Optics, Readings, Region, Resolves, Wish};
 
 use super::args::FitArgs;
@@ -161,18 +162,13 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     }
     let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
     let (scan, kept) = Scan::of(&args.source, &args.chart)?;
-    if kept.is_none()
-        && args.picture.is_none()
-        && args.u_scale.is_none()
-        && dice.is_none()
-        && scan.is_for_blocks(&wish)
-    {
+    if kept.is_none() && args.picture.is_none() && dice.is_none() && scan.is_for_blocks() {
         return fit_stream(args, rays, wanted, (&scan, optics, &wish));
     }
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
     let input = kept.map_or_else(|| stream::all(&args.source, chart), Ok)?;
     let region = args.chart.region(chart, &input.samples.iter().map(|sample| sample.ray.ray()));
-    let (samples, limits) = input.fit_readings(args.u_relative);
+    let (samples, limits) = input.fit_readings(input.noise(args.u_relative));
     let readings = Readings { limits: &limits, common: &common, ..Readings::of(&samples) };
     let ruled = fit::fit_wished(&readings, &region, &wish, optics.as_ref()).map_err(refused)?;
     let fit = &ruled.fit;
@@ -224,7 +220,12 @@ fn scale_of(args: &FitArgs) -> Result<Vec<fit::Common>, Failure> {
     if !(u >= 0.0 && u.is_finite()) {
         return Err(Failure::start(format!("--u-scale: {u}; expected a number of 0 or more")));
     }
-    Ok(vec![fit::Common { name: "scale".to_owned(), u, shift: fit::Shift::Scale }])
+    Ok(vec![scale(u)])
+}
+
+/// Of a relative standard uncertainty.
+pub(super) fn scale(u: f64) -> fit::Common {
+    fit::Common { name: "scale".to_owned(), u, shift: fit::Shift::Scale }
 }
 
 /// A long file, in blocks.
@@ -234,9 +235,12 @@ fn fit_stream(
     wanted: &[Wanted],
     (scan, optics, wish): (&Scan, Option<Optics>, &Wish),
 ) -> Outcome {
-    let (model, choice) = scan.model(&args.source, wish, optics.as_ref())?;
-    let closed = scan.fit(&args.source, model, optics, args.u_relative)?;
-    let ruled = closed.fit.ruled(&wish.rules).map_err(|error| {
+    let optics = optics.as_ref();
+    let (model, choice) = scan.model(&args.source, (wish, optics), args.u_relative)?;
+    let asked = Asked { region: scan.region, model, robust: wish.rules.robust, optics };
+    let us = (args.u_relative, args.u_scale);
+    let (blockwise, treated) = scan.fit(&args.source, &asked, us)?;
+    let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
     let truncation = if choice.is_some() {
@@ -247,12 +251,12 @@ fn fit_stream(
     };
     let notes = [
         note_on_u(scan.has_u, args.u_relative),
-        "read in blocks, no sample kept: what single ones did is not listed".to_owned(),
+        "read in blocks, no sample kept".to_owned(),
         truncation.to_owned(),
     ];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
-    let treatment =
-        Treatment::default().with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
+    let treatment = Treatment::of_readings(wish.rules.robust, treated, &[])
+        .with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
     let file = FitFile {
         fit: &ruled.fit,
         treatment: &treatment,

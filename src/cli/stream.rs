@@ -1,19 +1,25 @@
-//! `gonio fit` of a long CSV: the file is read again and again, in blocks. Where no basis is pinned it is
-//! chosen from whole sweeps that a first look keeps, a bounded number of samples. Memory is that of those,
-//! of the coefficients' triangle and of a block.
+//! `gonio fit` of a long CSV: the file is walked through again and again, in blocks. Where no basis is pinned
+//! it is chosen from whole sweeps that a first look keeps, a bounded number of samples. Memory is that of
+//! those, of the coefficients' triangle and of a block.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use fit::partial::{Closed, Pass, Passes, Weighting};
-use fit::{Choice, Gleaning, Optics, Penalised, Ray, Region, Robust, Wish};
+use fit::blocks::{Asked, Blocks, Blockwise, Totals};
+use fit::{
+    Choice, Common, FitError, Gleaning, Noise, Optics, Penalised, Ray, Readings, Region, Robust,
+    Rules, Sample, Wish,
+};
 
 use super::args::ChartArgs;
 use super::chart::csv_help;
 use super::failure::Failure;
 use super::fit::FIT_HELP;
-use crate::export::{BlockError, InputSample, InputSamples, RayChart, read_sample_blocks};
+use crate::export::{
+    BlockError, InputSample, InputSamples, RayChart, TreatedReadings, read_sample_blocks,
+};
 use crate::rig::Quantity;
 
 /// What a file holds, by a first look at it.
@@ -26,9 +32,14 @@ pub(super) struct Scan {
     pub(super) flagged: usize,
     pub(super) used: usize,
     pub(super) has_u: bool,
-    has_limits: bool,
+    /// Those that have no part in the fit.
+    pub(super) left_out: TreatedReadings,
     is_surface: bool,
     gleaning: Gleaning,
+    totals: Totals,
+    /// Of the samples that are no limits.
+    squares: f64,
+    plain: usize,
 }
 
 impl Scan {
@@ -74,10 +85,16 @@ impl Scan {
             *y_m = (y_m.0.min(ray.y_m), y_m.1.max(ray.y_m));
             *theta_max_rad = theta_max_rad.max(ray.theta_rad);
         }
-        let (used, _) = block.fit_samples_with_lines();
-        self.used += used.len();
-        self.has_limits |= block.with_limits().count() > used.len();
-        self.gleaning.take(&used);
+        for sample in block.left_out() {
+            self.left_out.leave_out(sample.line, sample.ray.ray(), sample.value);
+        }
+        let (samples, limits) = block.fit_readings(Noise::Unknown);
+        self.used += samples.len();
+        self.totals.take(&Readings { limits: &limits, ..Readings::of(&samples) });
+        let (plain, _) = block.fit_samples_with_lines();
+        self.plain += plain.len();
+        self.squares += plain.iter().map(|sample| sample.value * sample.value).sum::<f64>();
+        self.gleaning.take(&plain);
     }
 
     fn none(quantity: Quantity) -> Self {
@@ -88,62 +105,135 @@ impl Scan {
             flagged: 0,
             used: 0,
             has_u: false,
-            has_limits: false,
+            left_out: TreatedReadings::default(),
             is_surface: false,
             gleaning: Gleaning::new(KEPT_MAX),
+            totals: Totals::default(),
+            squares: 0.0,
+            plain: 0,
         }
     }
 
-    /// Whether the file is long and what is asked for needs no more than passes over it.
-    pub(super) fn is_for_blocks(&self, wish: &Wish) -> bool {
-        let is_plain = wish.rules.robust == Robust::None && !self.has_limits && self.is_surface;
-        self.samples > KEPT_MAX && is_plain
+    /// Whether the file is longer than what is kept.
+    pub(super) fn is_for_blocks(&self) -> bool {
+        self.samples > KEPT_MAX && self.is_surface
     }
 
-    /// The basis that is pinned, or that the sweeps which were kept ask for.
+    /// The basis that is pinned, or that the sweeps which were kept ask for: where outliers are weighed,
+    /// those without them.
     pub(super) fn model(
         &self,
         path: &Path,
-        wish: &Wish,
-        optics: Option<&Optics>,
+        (wish, optics): (&Wish, Option<&Optics>),
+        u_relative: Option<f64>,
     ) -> Result<(Penalised, Option<Choice>), Failure> {
-        let samples = self.gleaning.clone().into_samples();
-        fit::choose(&samples, &self.region, wish, optics).map_err(|error| {
-            // Whose sample is wrong is known by its line to a pass over the file alone.
-            let flat = fit::BasisSpec::zernike(0, 0).into();
-            let by_line = error.index().and_then(|_| self.fit(path, flat, None, None).err());
+        let noise = self.noise(u_relative);
+        let samples = self.gleaning.clone().into_samples().into_iter();
+        let samples: Vec<Sample> = samples.map(|sample| known(sample, noise)).collect();
+        let chosen = if wish.rules.robust == Robust::None || wish.decided().is_some() {
+            fit::choose(&samples, &self.region, wish, optics)
+        } else {
+            let rules = Rules { robust: wish.rules.robust, ..Rules::default() };
+            let wish = Wish { rules, ..*wish };
+            fit::fit_wished(&Readings::of(&samples), &self.region, &wish, optics)
+                .map(|ruled| (ruled.fit.model(), ruled.choice))
+        };
+        chosen.map_err(|error| {
+            // Whose sample is wrong is known by its line to a walk through the file alone.
+            let asked = Asked {
+                region: self.region,
+                model: fit::BasisSpec::zernike(0, 0).into(),
+                robust: Robust::None,
+                optics: None,
+            };
+            let by_line =
+                error.index().and_then(|_| self.fit(path, &asked, (u_relative, None)).err());
             by_line.unwrap_or_else(|| {
                 Failure::with_help(format!("{}: {error}", path.display()), FIT_HELP)
             })
         })
     }
 
-    /// The fit, in as many passes as it takes.
+    /// The fit, in as many walks as it takes, and the readings that are no plain ones.
     pub(super) fn fit(
         &self,
         path: &Path,
-        model: Penalised,
-        optics: Option<Optics>,
-        u_relative: Option<f64>,
-    ) -> Result<Closed, Failure> {
-        let shown = path.display();
-        let refused =
-            |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
-        let weighting = if self.has_u { Weighting::Stated } else { Weighting::Alike };
-        let mut passes = Passes::new(self.region, model, optics, weighting).map_err(refused)?;
-        for _ in 0..PASSES_MAX {
-            each_block(path, RayChart::Surface, |block| {
-                let (samples, lines) = block.fit_samples_with_lines();
-                passes.absorb(&samples).map_err(|error| match error.index() {
-                    Some(index) => format!("line {}: {error}", lines[index]),
-                    None => error.to_string(),
-                })
-            })?;
-            if let Pass::Done(closed) = passes.end(u_relative).map_err(refused)? {
-                return Ok(*closed);
+        asked: &Asked<'_>,
+        (u_relative, u_scale): (Option<f64>, Option<f64>),
+    ) -> Result<(Blockwise, TreatedReadings), Failure> {
+        let lines = RefCell::new(Vec::new());
+        let noise = self.noise(u_relative);
+        let mut file = LongCsv { path, noise, u_scale, lines: &lines };
+        let mut treated = self.left_out.clone();
+        let totals = if u_relative.is_some() { self.totals.known() } else { self.totals };
+        let fitted = fit::blocks::fit(&mut file, &totals, asked, &mut |block, told| {
+            let lines = lines.borrow();
+            let named = |i: usize| (lines[i], block.samples[i].ray, block.samples[i].value);
+            treated.take(&told.weighed, named);
+        });
+        let fitted = fitted.map_err(|stopped| match stopped {
+            Stopped::Source(failure) => failure,
+            Stopped::Fit(error) => {
+                Failure::with_help(format!("{}: {error}", path.display()), FIT_HELP)
             }
-        }
-        Err(refused(fit::FitError::OutOfRange))
+        })?;
+        Ok((fitted, treated))
+    }
+
+    /// Of samples that state no u.
+    fn noise(&self, u_relative: Option<f64>) -> Noise {
+        let Some(u_relative) = u_relative else { return Noise::Unknown };
+        let mean_square = self.squares / self.plain.max(1) as f64;
+        Noise::Fixed { variance: u_relative * u_relative * mean_square }
+    }
+}
+
+fn known(sample: Sample, without_u: Noise) -> Sample {
+    let noise = if sample.noise == Noise::Unknown { without_u } else { sample.noise };
+    Sample { noise, ..sample }
+}
+
+/// A file that is walked through again and again.
+struct LongCsv<'a> {
+    path: &'a Path,
+    /// Of samples that state no u.
+    noise: Noise,
+    u_scale: Option<f64>,
+    /// Where the samples of the block stand that is looked at.
+    lines: &'a RefCell<Vec<u64>>,
+}
+
+/// Why a walk did not come to its end.
+enum Stopped {
+    Source(Failure),
+    Fit(FitError),
+}
+
+impl From<FitError> for Stopped {
+    fn from(error: FitError) -> Self {
+        Self::Fit(error)
+    }
+}
+
+impl Blocks for LongCsv<'_> {
+    type Error = Stopped;
+
+    fn each(
+        &mut self,
+        take: &mut dyn FnMut(&Readings<'_>) -> Result<(), FitError>,
+    ) -> Result<(), Stopped> {
+        let common: Vec<Common> = self.u_scale.map(super::fit::scale).into_iter().collect();
+        each_block(self.path, RayChart::Surface, |block| {
+            let (samples, limits) = block.fit_readings(self.noise);
+            let lines = block.with_limits().map(|sample| sample.line);
+            self.lines.replace(lines.collect());
+            let readings = Readings { limits: &limits, common: &common, ..Readings::of(&samples) };
+            take(&readings).map_err(|error| match error.index() {
+                Some(index) => format!("line {}: {error}", self.lines.borrow()[index]),
+                None => error.to_string(),
+            })
+        })
+        .map_err(Stopped::Source)
     }
 }
 
@@ -200,5 +290,3 @@ fn error_help<E>(error: &BlockError<E>, chart: RayChart) -> String {
 const NOWHERE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 /// Fewer samples than this are kept rather than read again, and of more this many at most: some 10 MB.
 const KEPT_MAX: usize = 50_000;
-/// The excess settles in fewer.
-const PASSES_MAX: usize = 40;

@@ -192,7 +192,7 @@ impl InputSamples {
     }
 
     /// Of samples that state no u.
-    fn noise(&self, u_relative: Option<f64>) -> Noise {
+    pub fn noise(&self, u_relative: Option<f64>) -> Noise {
         let Some(u_relative) = u_relative else { return Noise::Unknown };
         let squares: f64 = self.used().map(|sample| sample.value * sample.value).sum();
         let mean_square = squares / self.used().count().max(1) as f64;
@@ -200,9 +200,8 @@ impl InputSamples {
     }
 
     /// The same with saturated ones, which are lower limits: where those are among the others.
-    pub fn fit_readings(&self, u_relative: Option<f64>) -> (Vec<fit::Sample>, Vec<usize>) {
-        let noise = self.noise(u_relative);
-        let samples = self.with_limits().map(|sample| sample.fit_sample(noise)).collect();
+    pub fn fit_readings(&self, without_u: Noise) -> (Vec<fit::Sample>, Vec<usize>) {
+        let samples = self.with_limits().map(|sample| sample.fit_sample(without_u)).collect();
         let places = self.with_limits().enumerate();
         (samples, places.filter(|(_, s)| !is_used(s.flags)).map(|(i, _)| i).collect())
     }

@@ -50,4 +50,4 @@ pub use ray_chart::{ListedRay, RayChart};
 pub use readings::write_readings;
 pub use samples::{RayColumns, write_samples};
 pub use samples_meta::SamplesMeta;
-pub use treatment::{TreatedReading, Treatment, Why, write_weights};
+pub use treatment::{TreatedReading, TreatedReadings, Treatment, Why, write_weights};

@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use fit::{Chart, Fit, FittedNuisance, Nonnegative, Robust, SymmetryError, SymmetryTest};
+use fit::{Chart, Fit, FittedNuisance, Nonnegative, Robust, SymmetryError, SymmetryTest, Weighed};
 use serde_json::{Value, json};
 
 use super::charted::{coordinates, ray_json};
@@ -11,8 +11,10 @@ use super::number::number;
 use crate::rig::Quantity;
 use crate::rig::calibration::FittedDrift;
 
-/// Readings that fit.json lists at most; where there are more, weights.csv has all.
+/// Readings that fit.json lists at most; where there are more, weights.csv has them.
 const LISTED_MAX: usize = 50;
+/// Readings that weights.csv lists at most: 4 MB or so.
+const KEPT_MAX: usize = 50_000;
 /// A residual beyond so many of its standard deviations is remarkable.
 const REMARKABLE: f64 = 5.0;
 /// A reading with less of its weight left counts as downweighted.
@@ -25,11 +27,18 @@ const HOLDING: f64 = 1e-3;
 pub struct Treatment<'a> {
     /// How outliers were weighed.
     robust: Robust,
-    listed: Vec<TreatedReading>,
+    readings: TreatedReadings,
     nuisances: &'a [FittedNuisance],
     drift: Option<&'a FittedDrift>,
     symmetry: Option<&'a Result<SymmetryTest, SymmetryError>>,
     nonnegative: Option<&'a Nonnegative>,
+}
+
+/// Readings that are no plain ones: all are counted, the farthest off are listed.
+#[derive(Debug, Clone, Default)]
+pub struct TreatedReadings {
+    counts: [usize; Why::ALL.len()],
+    listed: Vec<TreatedReading>,
 }
 
 /// A reading that is listed.
@@ -97,21 +106,15 @@ impl Why {
     }
 }
 
-impl<'a> Treatment<'a> {
-    /// Of a fit whose sample i is the reading `name(i)`: its id, ray and value; and of those left out.
-    pub fn of(
-        fit: &'a Fit,
-        name: impl Fn(usize) -> (u64, fit::Ray, f64),
-        left_out: impl IntoIterator<Item = (u64, fit::Ray, f64)>,
-    ) -> Self {
-        let mut listed: Vec<TreatedReading> = left_out
-            .into_iter()
-            .map(|(id, ray, value)| {
-                let why = Why::LeftOut;
-                TreatedReading { id, ray, value, residual: None, weight: 0.0, why }
-            })
-            .collect();
-        let Some(weighed) = fit.weighed() else { return Self { listed, ..Self::default() } };
+impl TreatedReadings {
+    /// Notes a reading that has no part in the fit.
+    pub fn leave_out(&mut self, id: u64, ray: fit::Ray, value: f64) {
+        let why = Why::LeftOut;
+        self.note(TreatedReading { id, ray, value, residual: None, weight: 0.0, why });
+    }
+
+    /// Notes what became of readings, the i-th of which is `name(i)`: its id, ray and value.
+    pub fn take(&mut self, weighed: &Weighed, name: impl Fn(usize) -> (u64, fit::Ray, f64)) {
         for (i, (&weight, &z)) in weighed.weights.iter().zip(&weighed.residuals).enumerate() {
             let why = if weighed.limits.binary_search(&i).is_ok() {
                 if weight < HOLDING { Why::LimitExceeded } else { Why::LimitHolding }
@@ -123,11 +126,50 @@ impl<'a> Treatment<'a> {
                 continue;
             };
             let (id, ray, value) = name(i);
-            listed.push(TreatedReading { id, ray, value, residual: Some(z), weight, why });
+            self.note(TreatedReading { id, ray, value, residual: Some(z), weight, why });
         }
+    }
+
+    fn note(&mut self, reading: TreatedReading) {
+        self.counts[reading.why as usize] += 1;
+        self.listed.push(reading);
+        if self.listed.len() >= 2 * KEPT_MAX {
+            self.sort();
+        }
+    }
+
+    /// The farthest off first; forgets those beyond what is kept.
+    fn sort(&mut self) {
         let size = |reading: &TreatedReading| reading.residual.map_or(f64::INFINITY, f64::abs);
-        listed.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.id.cmp(&b.id)));
-        Self { robust: weighed.robust, listed, nuisances: &weighed.nuisances, ..Self::default() }
+        self.listed.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.id.cmp(&b.id)));
+        self.listed.truncate(KEPT_MAX);
+    }
+}
+
+impl<'a> Treatment<'a> {
+    /// Of a fit whose sample i is the reading `name(i)`: its id, ray and value; and of those left out.
+    pub fn of(
+        fit: &'a Fit,
+        name: impl Fn(usize) -> (u64, fit::Ray, f64),
+        left_out: impl IntoIterator<Item = (u64, fit::Ray, f64)>,
+    ) -> Self {
+        let mut readings = TreatedReadings::default();
+        left_out.into_iter().for_each(|(id, ray, value)| readings.leave_out(id, ray, value));
+        let Some(weighed) = fit.weighed() else {
+            return Self::of_readings(Robust::None, readings, &[]);
+        };
+        readings.take(weighed, name);
+        Self::of_readings(weighed.robust, readings, &weighed.nuisances)
+    }
+
+    /// Of a fit that forgot its readings, of those that were noted on the way.
+    pub fn of_readings(
+        robust: Robust,
+        mut readings: TreatedReadings,
+        nuisances: &'a [FittedNuisance],
+    ) -> Self {
+        readings.sort();
+        Self { robust, readings, nuisances, ..Self::default() }
     }
 
     /// With what the field was held to.
@@ -166,20 +208,20 @@ impl<'a> Treatment<'a> {
         self.nuisances
     }
 
-    /// Every reading that is no plain one, the farthest off first.
+    /// The readings that are no plain ones, the farthest off first: of very many the farthest.
     pub fn listed(&self) -> &[TreatedReading] {
-        &self.listed
+        &self.readings.listed
     }
 
     /// Whether there are more of them than fit.json lists, so that weights.csv is written.
     pub fn is_long(&self) -> bool {
-        self.listed.len() > LISTED_MAX
+        self.listed().len() > LISTED_MAX
     }
 
     /// How many there are of each kind, those kinds that there are.
     pub fn counts(&self) -> Vec<(Why, usize)> {
-        let count = |why| self.listed.iter().filter(|reading| reading.why == why).count();
-        Why::ALL.into_iter().map(|why| (why, count(why))).filter(|(_, n)| *n > 0).collect()
+        let counts = Why::ALL.into_iter().zip(self.readings.counts);
+        counts.filter(|(_, n)| *n > 0).collect()
     }
 
     /// How outliers were weighed.
@@ -189,11 +231,10 @@ impl<'a> Treatment<'a> {
 
     pub(super) fn readings(&self, chart: &Chart) -> Value {
         let mut object = json!({"robust": self.robust.name()});
-        for why in Why::ALL {
-            let count = self.listed.iter().filter(|reading| reading.why == why).count();
+        for (why, count) in Why::ALL.into_iter().zip(self.readings.counts) {
             object[why.name()] = json!(count);
         }
-        let listed = self.listed.iter().take(LISTED_MAX).map(|reading| {
+        let listed = self.listed().iter().take(LISTED_MAX).map(|reading| {
             let mut listed = ray_json(reading.ray, chart);
             listed["reading"] = json!(reading.id);
             listed["value"] = json!(reading.value);
@@ -252,7 +293,7 @@ fn tested(test: &SymmetryTest, is_used: bool) -> Value {
     })
 }
 
-/// Writes weights.csv: every reading that is no plain one, the farthest off first, its ray by the
+/// Writes weights.csv: the readings that are no plain ones, the farthest off first, its ray by the
 /// chart's own coordinates.
 pub fn write_weights(
     out: impl Write,
@@ -266,7 +307,7 @@ pub fn write_weights(
     let radiance = quantity.radiance_column();
     let header = ["reading"].into_iter().chain(names);
     csv.write_record(header.chain([radiance, "residual_over_u", "weight", "why"]))?;
-    for reading in &treatment.listed {
+    for reading in treatment.listed() {
         let ray = coordinates(reading.ray, chart).into_iter().map(|(_, value)| number(value));
         let record = [reading.id.to_string()].into_iter().chain(ray).chain([
             number(reading.value),
@@ -288,7 +329,9 @@ mod tests {
         let ray = fit::Ray { x_m: 2e-3, y_m: 0.0, theta_rad: 0.25, phi_rad: 0.0 };
         let (id, value, why) = (7, 1.5, Why::Downweighted);
         let reading = TreatedReading { id, ray, value, residual: Some(6.0), weight: 0.25, why };
-        let treatment = Treatment { listed: vec![reading], ..Treatment::default() };
+        let mut readings = TreatedReadings::default();
+        readings.note(reading);
+        let treatment = Treatment::of_readings(Robust::None, readings, &[]);
         let side = (0.0, 0.1);
         let planes = Chart::TwoPlane { distance_m: 1.0, s_m: side, t_m: side };
         for (chart, names, first) in [

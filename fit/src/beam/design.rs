@@ -36,6 +36,20 @@ pub struct BeamRows {
     pub quadrature: f64,
 }
 
+impl BeamRows {
+    /// These rows and others.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            point: self.point + other.point,
+            averaged: self.averaged + other.averaged,
+            cut: self.cut + other.cut,
+            off_sample: self.off_sample + other.off_sample,
+            directions: self.directions + other.directions,
+            quadrature: self.quadrature.hypot(other.quadrature),
+        }
+    }
+}
+
 /// How one row is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -259,6 +273,11 @@ impl<'s> Design<'s> {
             dot(&room.row, coefficients)
         };
         level(&through.averager, &mut through.means) - level(averager, &mut room.means)
+    }
+
+    /// The field that an offset of all readings looks like, if it does like any.
+    pub(crate) fn constant(&self) -> Option<Vec<f64>> {
+        self.holds_constant().then(|| self.basis.unity())
     }
 
     /// Whether an offset of all readings is a constant field: not where something cuts a beam.

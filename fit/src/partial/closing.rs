@@ -1,11 +1,12 @@
 //! From the triangle of all readings to the fit: their noise as a whole, and the covariance.
 
 use super::{Partial, Sums, Weighting};
+use crate::excess::threshold;
 use crate::parts::{CommonShift, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::solve::left_over;
-use crate::triangle::{Solution, Spectrum};
-use crate::weights::threshold;
+use crate::triangle::Solution;
+use crate::undetermined::by_functions;
 use crate::{Fit, FitError};
 
 /// The fit of all shares.
@@ -55,7 +56,7 @@ impl Partial {
             let solution = whole.solve().ok_or(FitError::OutOfRange)?;
             let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
             if prior.is_none() && spectrum.rank() < basis.len() {
-                return Err(undetermined(&spectrum, |k| basis.name(k)));
+                return Err(by_functions(&spectrum, |k| basis.name(k)));
             }
             let coefficients = solution.unknowns(0);
             let factor = solution.inverse();
@@ -123,21 +124,6 @@ fn shifts(solution: &Solution, common: Vec<String>) -> Vec<CommonShift> {
     common.into_iter().enumerate().map(shift).collect()
 }
 
-/// The rays are forgotten: only the functions can be named.
-fn undetermined(spectrum: &Spectrum, name: impl Fn(usize) -> String) -> FitError {
-    let shares = spectrum.undetermined_shares();
-    let mut by_share: Vec<usize> = (0..shares.len()).collect();
-    by_share.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]).then(a.cmp(b)));
-    FitError::Undetermined {
-        rank: spectrum.rank(),
-        coefficients: shares.len(),
-        causes: Vec::new(),
-        functions: by_share.into_iter().take(NAMES_MAX).map(name).collect(),
-    }
-}
-
-/// Most functions that are named.
-const NAMES_MAX: usize = 8;
 /// Without a penalty the second pass is the last: the noise then leaves the coefficients alone.
 const PASSES_MAX: usize = 12;
 /// The noise agrees with the fit that it leads to.

@@ -31,7 +31,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use beyond::{Pass, Passes};
 pub use closing::Closed;
 
 use std::fmt;
@@ -43,7 +42,6 @@ use crate::check::check_sample;
 use crate::triangle::Triangle;
 use crate::{BasisSpec, Common, FitError, Noise, Penalised, Penalty, Region, Sample};
 
-mod beyond;
 mod closing;
 
 /// What the rows of a share are weighted by.

@@ -150,35 +150,3 @@ fn a_penalised_merge_equals_the_penalised_fit() {
         assert!(merged.dof() > 300 - 135 && merged.dof() < 290);
     }
 }
-
-#[test]
-fn readings_that_come_again_are_fitted_as_those_that_are_kept() {
-    // Scatter three times as large as stated, of u that differ.
-    for (optics, beyond) in [(None, 3.0), (None, 0.4)] {
-        let mut samples = samples(4000, |i| Some(0.2 + 0.1 * (i % 7) as f64));
-        for sample in &mut samples {
-            let Noise::Fixed { variance } = sample.noise else { panic!("stated") };
-            sample.noise = Noise::Fixed { variance: variance / (beyond * beyond) };
-        }
-        let whole = crate::fit_seen(&samples, &REGION, BASIS, &[], optics.as_ref()).unwrap();
-        let mut passes = Passes::new(REGION, BASIS, optics, Weighting::Stated).unwrap();
-        let mut count = 0;
-        let closed = loop {
-            for block in samples.chunks(600) {
-                passes.absorb(block).unwrap();
-            }
-            count += 1;
-            if let Pass::Done(closed) = passes.end(None).unwrap() {
-                break closed;
-            }
-            assert!(count < 20);
-        };
-        assert_eq!(count == 1, whole.excess_rms() <= 0.0);
-        // The fit of kept readings stops when its weights agree to a hundredth.
-        let (a, b) = (closed.fit.exitance(), whole.exitance());
-        assert!((a.value - b.value).abs() < 0.02 * b.u && (a.u / b.u - 1.0).abs() < 5e-3);
-        assert!((closed.fit.excess_rms() - whole.excess_rms()).abs() <= 0.01 * whole.excess_rms());
-        assert!((closed.fit.chi2() / whole.chi2() - 1.0).abs() < 1e-3);
-        assert_eq!(closed.fit.dof(), whole.dof());
-    }
-}

@@ -58,12 +58,13 @@ pub(crate) fn fit(
         common.iter().partition(|common| common.shift.is_shared());
     let settled = settle(&design, &prior, readings, &jitters)?;
     let shifting: Vec<&Common> =
-        common.iter().copied().filter(|c| needs_a_side(c, &design)).collect();
+        common.iter().copied().filter(|c| needs_a_side(c, design.holds_constant())).collect();
     let sides = sensitivities(&design, &settled, &shifting)?;
     let Solved { mut factor, unknowns, determined } =
         solve(&design, &settled.rows(), &sides, &prior)?;
     let coefficients = unknowns[0].clone();
-    let shifts = shifts(&common, &coefficients, &design, |side| unknowns[side].clone());
+    let constant = design.constant();
+    let shifts = shifts(&common, &coefficients, constant.as_deref(), |side| unknowns[side].clone());
     let levels = levels(&design, &coefficients);
     let settled = Settled { levels, determined, ..settled };
     let quality = quality(&design, factor.condition(), &settled, limits);

@@ -112,7 +112,9 @@ impl Shared {
         let none = vec![0.0; own.basis().len()];
         let mut shared =
             Self { sides: influence.columns.clone(), shifts: vec![none; influence.columns.len()] };
-        for common in common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, own)) {
+        for common in
+            common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, own.holds_constant()))
+        {
             let Some(shift) = shifts.iter().find(|shift| shift.name == common.name) else {
                 continue;
             };

@@ -1,0 +1,289 @@
+//! Blocks against the fit of all readings in memory.
+
+use super::{Asked, Blocks, Blockwise, Totals, fit};
+use crate::{
+    BasisSpec, Common, Fit, FitError, FittedNuisance, Noise, Penalised, Penalty, Ray, Readings,
+    Region, Robust, Sample, Shift, fit_readings,
+};
+
+const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
+const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
+const READINGS: usize = 2500;
+
+/// Readings, and how what they share is made for those from one place to another.
+struct Source {
+    samples: Vec<Sample>,
+    flown: Vec<Option<(Ray, Ray)>>,
+    limits: Vec<usize>,
+    common: fn(usize) -> Vec<Common>,
+    nuisances: fn(usize) -> Vec<Common>,
+    walks: usize,
+}
+
+impl Source {
+    /// Of a field that the basis holds, scattering by 0.41; every 50th reading is off by a lot.
+    fn new(noise: impl Fn(usize, f64) -> Noise, spoilt: bool) -> Self {
+        let part = |i: usize, step: f64| (i as f64 * step + 0.37).fract();
+        let sample = |i: usize| {
+            let ray = Ray {
+                x_m: 0.02 * part(i, 0.618_034) - 0.01,
+                y_m: 0.02 * part(i, 0.754_878) - 0.01,
+                theta_rad: 1.4 * part(i, 0.569_840),
+                phi_rad: 6.2 * part(i, 0.438_579),
+            };
+            let scatter = part(i, 0.233_7) + part(i, 0.871_3) - 1.0;
+            let bent = 80.0 - 30.0 * ray.theta_rad.sin().powi(2);
+            let off = if spoilt && i.is_multiple_of(50) { 9.0 } else { 0.0 };
+            let value = bent + 10.0 * ray.x_m / 0.01 + scatter + off;
+            Sample { ray, value, noise: noise(i, value) }
+        };
+        let samples = (0..READINGS).map(sample).collect();
+        let none = |_| Vec::new();
+        let (flown, limits) = (Vec::new(), Vec::new());
+        Self { samples, flown, limits, common: none, nuisances: none, walks: 0 }
+    }
+
+    fn part(&self, from: usize, to: usize, take: &mut dyn FnMut(&Readings<'_>)) {
+        let end = to.min(self.flown.len());
+        let limits: Vec<usize> =
+            self.limits.iter().filter(|i| (from..to).contains(*i)).map(|i| i - from).collect();
+        let (common, nuisances) = ((self.common)(from), (self.nuisances)(from));
+        take(&Readings {
+            flown: self.flown.get(from..end).unwrap_or(&[]),
+            limits: &limits,
+            common: &common,
+            nuisances: &nuisances,
+            ..Readings::of(&self.samples[from..to])
+        });
+    }
+
+    fn in_memory(&self, model: Penalised, robust: Robust) -> (Fit, Vec<FittedNuisance>) {
+        let mut whole = None;
+        self.part(0, self.samples.len(), &mut |readings| {
+            let readings = Readings { robust, ..*readings };
+            whole = Some(fit_readings(&readings, &REGION, model, None).unwrap());
+        });
+        let fit = whole.unwrap();
+        let nuisances = fit.weighed().unwrap().nuisances.clone();
+        (fit, nuisances)
+    }
+}
+
+impl Blocks for Source {
+    type Error = FitError;
+
+    fn each(
+        &mut self,
+        take: &mut dyn FnMut(&Readings<'_>) -> Result<(), FitError>,
+    ) -> Result<(), FitError> {
+        self.walks += 1;
+        let mut outcome = Ok(());
+        for from in (0..self.samples.len()).step_by(BLOCK) {
+            let to = (from + BLOCK).min(self.samples.len());
+            self.part(from, to, &mut |readings| {
+                if outcome.is_ok() {
+                    outcome = take(readings);
+                }
+            });
+        }
+        outcome
+    }
+}
+
+const BLOCK: usize = 170;
+
+/// By blocks, and what each reading's weight, residual and influence on the exitance are.
+fn in_blocks(source: &mut Source, model: Penalised, robust: Robust) -> (Blockwise, [Vec<f64>; 3]) {
+    let mut totals = Totals::default();
+    let mut look = |block: &Readings<'_>| {
+        totals.take(block);
+        Ok(())
+    };
+    source.each(&mut look).unwrap();
+    source.walks = 0;
+    let asked = Asked { region: REGION, model, robust, optics: None };
+    let mut each = [const { Vec::new() }; 3];
+    let outcome = fit(source, &totals, &asked, &mut |_, told| {
+        each[0].extend_from_slice(&told.weighed.weights);
+        each[1].extend_from_slice(&told.weighed.residuals);
+        each[2].extend_from_slice(&told.influence.exitance);
+    });
+    (outcome.unwrap(), each)
+}
+
+/// All numbers of a fit within a part of their size, what is left of it where nothing is excess.
+fn assert_same(source: &mut Source, model: impl Into<Penalised>, robust: Robust, tolerance: f64) {
+    let model = model.into();
+    let (whole, nuisances) = source.in_memory(model, robust);
+    let (found, each) = in_blocks(source, model, robust);
+    let numbers = |fit: &Fit| -> Vec<f64> {
+        let estimates = [fit.exitance(), fit.flux(), fit.intensity(0.4, 1.0)];
+        let of = |e: &crate::Estimate| [e.value, e.u, e.u_independent];
+        let mut all: Vec<f64> = estimates.iter().flat_map(of).collect();
+        all.extend([fit.condition(), fit.chi2(), fit.residual_rms(), fit.excess_rms()]);
+        all.extend(fit.determined().is_finite().then(|| fit.determined()));
+        all.extend_from_slice(fit.coefficients());
+        all.extend(fit.parts().shifts.iter().flat_map(|shift| shift.shift.clone()));
+        all
+    };
+    let (a, b) = (numbers(&found.fit), numbers(&whole));
+    assert_eq!(a.len(), b.len());
+    for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+        assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "number {i}: {a} {b}");
+    }
+    assert_eq!((found.fit.n_used(), found.fit.dof()), (whole.n_used(), whole.dof()));
+    assert_eq!(found.nuisances.len(), nuisances.len());
+    for (a, b) in found.nuisances.iter().zip(&nuisances) {
+        assert!(a.name == b.name && (a.value - b.value).abs() <= tolerance);
+        assert!((a.u - b.u).abs() <= tolerance, "{a:?} {b:?}");
+    }
+    let weighed = whole.weighed().unwrap();
+    let influence = &whole.influence().unwrap().exitance;
+    for (a, b) in each.iter().zip([&weighed.weights, &weighed.residuals, influence]) {
+        assert_eq!(a.len(), b.len());
+        let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off <= 30.0 * tolerance, "{off}");
+    }
+}
+
+fn stated(u: f64) -> impl Fn(usize, f64) -> Noise {
+    move |i, _| {
+        let u = if i % 2 == 0 { u } else { 1.2 * u };
+        Noise::Fixed { variance: u * u }
+    }
+}
+
+/// As shot noise: 0.41 at 70.
+fn modelled(_: usize, _: f64) -> Noise {
+    Noise::Modelled { floor: 0.02, per_radiance: 2.2e-3 }
+}
+
+#[test]
+fn readings_that_are_what_they_read_come_out_as_in_memory() {
+    let penalty = Penalty { power: 2.0, strength: 3.0 };
+    for model in [BASIS.into(), Penalised::new(BASIS, penalty)] {
+        assert_same(&mut Source::new(stated(0.42), false), model, Robust::None, 1e-10);
+        assert_same(&mut Source::new(modelled, false), model, Robust::None, 1e-10);
+        // Scatter beyond what is stated goes by sums.
+        assert_same(&mut Source::new(stated(0.1), false), model, Robust::None, 1e-6);
+        assert_same(&mut Source::new(|_, _| Noise::Unknown, false), model, Robust::None, 1e-6);
+    }
+    let mut source = Source::new(stated(0.42), false);
+    in_blocks(&mut source, BASIS.into(), Robust::None);
+    assert_eq!(source.walks, 3);
+}
+
+#[test]
+fn outliers_lose_the_weight_that_they_lose_in_memory() {
+    for robust in [Robust::Huber, Robust::Tukey] {
+        assert_same(&mut Source::new(stated(0.42), true), BASIS, robust, 1e-9);
+        assert_same(&mut Source::new(modelled, true), BASIS, robust, 1e-9);
+        assert_same(&mut Source::new(stated(0.1), true), BASIS, robust, 3e-4);
+        assert_same(&mut Source::new(|_, _| Noise::Unknown, true), BASIS, robust, 3e-4);
+    }
+    // It is the outliers that do.
+    let (found, each) =
+        in_blocks(&mut Source::new(stated(0.42), true), BASIS.into(), Robust::Tukey);
+    assert!(each[0].iter().step_by(50).all(|weight| *weight == 0.0));
+    assert_eq!(found.fit.n_used(), READINGS - READINGS / 50);
+}
+
+#[test]
+fn limits_hold_the_field_up_as_in_memory() {
+    for robust in [Robust::None, Robust::Tukey] {
+        for noise in [0.42, 0.1] {
+            let mut source = Source::new(stated(noise), false);
+            // Saturated at 74, blocks without any other reading among them.
+            let above = |i: &usize| source.samples[*i].value > 74.0 || (340..510).contains(i);
+            source.limits = (0..READINGS).filter(above).collect();
+            for &i in &source.limits {
+                source.samples[i].value = source.samples[i].value.min(74.0);
+            }
+            assert!(source.limits.len() > 600);
+            let tolerance = if noise > 0.4 { 1e-9 } else { 3e-4 };
+            assert_same(&mut source, BASIS, robust, tolerance);
+        }
+    }
+}
+
+/// A gain of the second half, and what else goes by the reading.
+fn common(from: usize) -> Vec<Common> {
+    let half = move |i: usize, level: f64| if from + i > READINGS / 2 { 0.01 * level } else { 0.0 };
+    let tilted = |_: usize, ray: &Ray| Ray { theta_rad: ray.theta_rad + 2e-3, ..*ray };
+    let jittered = move |i: usize, ray: &Ray| {
+        let by = if (from + i).is_multiple_of(3) { 5e-3 } else { 0.0 };
+        Ray { theta_rad: ray.theta_rad + by, ..*ray }
+    };
+    vec![
+        Common { name: "scale".into(), u: 0.02, shift: Shift::Scale },
+        Common { name: "half".into(), u: 0.01, shift: Shift::Value(Box::new(half)) },
+        Common { name: "jitter".into(), u: 5e-3, shift: Shift::Jitter(Box::new(jittered)) },
+        Common { name: "dark".into(), u: 0.05, shift: Shift::Offset },
+        Common { name: "zero".into(), u: 2e-3, shift: Shift::Ray(Box::new(tilted)) },
+    ]
+}
+
+/// What goes up with time, and another range's gain.
+fn nuisances(from: usize) -> Vec<Common> {
+    let drift =
+        move |i: usize, level: f64| level * 0.03 * ((from + i) as f64 / READINGS as f64 - 0.5);
+    let range =
+        move |i: usize, level: f64| if (from + i).is_multiple_of(3) { 0.01 * level } else { 0.0 };
+    vec![
+        Common { name: "drift".into(), u: 1.0, shift: Shift::Value(Box::new(drift)) },
+        Common { name: "range".into(), u: 0.01, shift: Shift::Value(Box::new(range)) },
+    ]
+}
+
+#[test]
+fn what_readings_share_is_carried_and_fitted_along_as_in_memory() {
+    for robust in [Robust::None, Robust::Huber] {
+        let mut source = Source::new(modelled, robust != Robust::None);
+        (source.common, source.nuisances) = (common, nuisances);
+        let drifted = |(i, sample): (usize, &mut Sample)| {
+            sample.value *= 1.0 + 0.02 * (i as f64 / READINGS as f64 - 0.5);
+        };
+        source.samples.iter_mut().enumerate().for_each(drifted);
+        let way = |sample: &Sample| {
+            let end = |by: f64| Ray { theta_rad: sample.ray.theta_rad + by, ..sample.ray };
+            (sample.ray.theta_rad < 1.3).then(|| (end(-0.05), end(0.05)))
+        };
+        source.flown = source.samples[..2000].iter().map(way).collect();
+        let (_, along) = source.in_memory(BASIS.into(), robust);
+        assert!((along[0].value - 0.67).abs() < 0.1, "{along:?}");
+        // The field scatters beyond what is stated, which goes by sums.
+        let tolerance = if robust == Robust::None { 1e-6 } else { 3e-4 };
+        assert_same(&mut source, BASIS, robust, tolerance);
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_as_in_memory() {
+    let refused = |source: &mut Source, model: Penalised| {
+        let mut totals = Totals::default();
+        let mut look = |block: &Readings<'_>| {
+            totals.take(block);
+            Ok(())
+        };
+        source.each(&mut look).unwrap();
+        let asked = Asked { region: REGION, model, robust: Robust::None, optics: None };
+        fit(source, &totals, &asked, &mut |_, _| {}).unwrap_err()
+    };
+    let mut source = Source::new(stated(0.42), false);
+    source.samples[200].value = f64::NAN;
+    // The block's own index.
+    let expected = FitError::NotFinite { index: 30, what: "value" };
+    assert_eq!(refused(&mut source, BASIS.into()), expected);
+    let mut source = Source::new(stated(0.42), false);
+    source.limits = (0..READINGS).collect();
+    assert_eq!(refused(&mut source, BASIS.into()), FitError::OnlyLimits { readings: READINGS });
+    let mut source = Source::new(stated(0.42), false);
+    source.samples.iter_mut().for_each(|sample| sample.ray.phi_rad = 0.3);
+    let error = refused(&mut source, BASIS.into());
+    assert!(matches!(error, FitError::Undetermined { .. }), "{error}");
+    source.common = |from| common(from).split_off(from.min(4));
+    let error = refused(&mut source, BasisSpec::zernike(0, 0).into());
+    assert!(error.to_string().contains("common components of a block"), "{error}");
+    source.samples.clear();
+    assert_eq!(refused(&mut source, BASIS.into()), FitError::Empty);
+}
