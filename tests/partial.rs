@@ -94,6 +94,71 @@ fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
     }
 }
 
+/// The same with every thirtieth sample far off, and all above 59.5 saturated there.
+fn spoilt(count: u32) -> String {
+    let mut lines = samples(0, count, true).lines().map(str::to_owned).collect::<Vec<_>>();
+    lines[0].push_str(",flags");
+    for (i, line) in lines.iter_mut().enumerate().skip(1) {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let value: f64 = fields[4].parse().unwrap();
+        let is_limit = value > 59.5;
+        let value = if i % 30 == 0 { value - 7.0 } else { value.min(59.5) };
+        fields[4] = value.to_string();
+        fields.push(if is_limit { "saturated" } else { "" }.to_owned());
+        *line = fields.join(",");
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn outliers_and_limits_weigh_in_blocks_as_in_memory() {
+    let bench = Bench::empty();
+    std::fs::write(bench.path("spoilt.csv"), spoilt(5_000)).unwrap();
+    let pinned = ["--angular-degree=4", "--position-degree=0", "--u-scale=0.01", "--json"];
+    for robust in ["none", "huber", "tukey"] {
+        let robust = ["fit", "spoilt.csv", "--robust", robust];
+        let kept = bench.gonio(&[&robust, &pinned[..]].concat()).well().json();
+        let blocks = bench.gonio(&[&robust, &pinned[..], &["--in-blocks"]].concat()).well().json();
+        assert_eq!(blocks["notes"][1], "read in blocks, no sample kept");
+        assert_same_but_for_truncation(&blocks, &kept);
+        let counts = |why: &str| blocks["readings"][why].as_u64().unwrap();
+        assert!(counts("limit_holding") > 100 && counts("limit_exceeded") > 0);
+        assert!(robust[3] == "none" || counts("downweighted") > 100);
+    }
+}
+
+/// Not the covariance: with truncation, scatter that finer functions explain is no excess.
+fn assert_same_but_for_truncation(blocks: &Value, kept: &Value) {
+    for key in ["coefficients", "condition", "residual_rms", "chi2", "n_used", "dof"] {
+        assert_close(&blocks[key], &kept[key], 3e-4);
+    }
+    for key in ["n_flagged", "n_excluded", "drift", "region"] {
+        assert_eq!(blocks[key], kept[key], "{key}");
+    }
+    for why in ["downweighted", "limit_exceeded", "limit_holding", "left_out", "remarkable"] {
+        assert_eq!(blocks["readings"][why], kept["readings"][why], "{why}");
+    }
+    let listed = |fit: &Value| fit["readings"]["listed"].as_array().map_or(0, Vec::len);
+    assert_eq!(listed(blocks), listed(kept));
+}
+
+#[test]
+fn a_run_in_blocks_is_the_run_at_once() {
+    let bench = Bench::small().with("plan.toml", "phi_step_deg = 45", "phi_step_deg = 30");
+    bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
+    for robust in ["none", "tukey"] {
+        let fit = ["fit", "out", "--angular-degree=2", "--robust", robust, "--json", "-o"];
+        let kept = bench.gonio(&[&fit[..], &["kept.json"]].concat()).well().json();
+        let blocks = [&fit[..], &["blocks.json", "--in-blocks"]].concat();
+        let blocks = bench.gonio(&blocks).well().json();
+        assert_eq!(blocks["notes"][0], "read in blocks, no sample kept");
+        assert_same_but_for_truncation(&blocks, &kept);
+        // Of more than one block.
+        assert!(blocks["n_used"].as_u64().unwrap() > 150, "{}", blocks["n_used"]);
+        assert_eq!(blocks["truth"]["exitance_w_per_m2"], kept["truth"]["exitance_w_per_m2"]);
+    }
+}
+
 #[test]
 fn the_basis_of_a_long_file_is_chosen_from_some_of_its_sweeps() {
     let bench = Bench::empty();

@@ -11,11 +11,12 @@ use super::args::FitArgs;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
+use super::long_run;
 use super::monte_carlo::{self, Dice};
 use super::output::{note, say, write_out};
 use super::partial;
 use super::picture;
-use super::results::{Results, optics, read_run};
+use super::results::{Results, compare, fit_region, open_run, optics};
 use super::setup::{Setup, rig_at};
 use super::stream::{self, Scan};
 use super::summary::{field_rows, model_rows, treatment_rows};
@@ -25,12 +26,16 @@ use crate::export::{
     FitFile, InputSample, ListedRay, MonteCarlo, RayChart, Treatment, read_rays, write_at,
     write_atomically, write_weights,
 };
+use crate::journal::{Order, Reader};
 use crate::plan::Wanted;
 use crate::rig::Reading;
 use crate::rig::calibration::{Fitted, IndependentParts, calibrate};
 
 pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
+/// A run of more readings is read in blocks: of this many all that is made of them takes half a gigabyte.
+const RUN_KEPT_MAX: u64 = 200_000;
+const IN_BLOCKS: &str = "read in blocks, no sample kept";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
 
@@ -84,9 +89,14 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
             "leave it out; it is for a CSV, which has none",
         ));
     }
-    let (mut setup, _, readings) = read_run(&args.source)?;
+    let (mut setup, _, reader) = open_run(&args.source)?;
     setup.plan.derive.extend_from_slice(wanted);
     let wish = wished(args, setup.plan.fit)?;
+    let is_long = reader.reading_count()? > RUN_KEPT_MAX && dice.is_none();
+    if args.in_blocks || is_long {
+        return fit_long_run(args, rays, (&setup, &reader, &wish));
+    }
+    let readings = reader.readings(Order::Taken)?;
     let results = Results::of(&setup, wish, &readings)?;
     let fitted = results
         .fitted
@@ -116,6 +126,41 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
         rounds: &setup.accounts,
         monte_carlo: monte_carlo.as_ref(),
     };
+    show(args, rays, &file, Some(&path))
+}
+
+/// A long run, in blocks.
+fn fit_long_run(
+    args: &FitArgs,
+    rays: Option<Vec<ListedRay>>,
+    (setup, reader, wish): (&Setup, &Reader, &Wish),
+) -> Outcome {
+    let made = long_run::fit(setup, reader, wish)?;
+    let fit = &made.ruled.fit;
+    let quantity = setup.rig.detector.quantity;
+    let derived = derive::derive(fit, quantity, &setup.plan.derive);
+    let treatment = Treatment::of_readings(wish.rules.robust, made.treated, &made.nuisances)
+        .with_rules(made.ruled.symmetry.as_ref(), made.ruled.nonnegative.as_ref())
+        .with_drift(made.drift.as_ref());
+    let notes = [IN_BLOCKS.to_owned(), truncation_note(made.ruled.choice.is_some()).to_owned()];
+    let file = FitFile {
+        fit,
+        treatment: &treatment,
+        choice: made.ruled.choice.as_ref(),
+        resolves: None,
+        quantity,
+        simulated: setup.rig.is_simulated(),
+        n_flagged: made.n_flagged,
+        n_excluded: made.n_excluded,
+        notes: &notes,
+        truth: compare(setup, &fit_region(setup), fit).map(|(truth, _)| truth),
+        independent: &made.independent,
+        derived: &derived,
+        rounds: &setup.accounts,
+        monte_carlo: None,
+    };
+    let path = args.output.clone().unwrap_or_else(|| args.source.join("fit.json"));
+    write_fit(&path, &file)?;
     show(args, rays, &file, Some(&path))
 }
 
@@ -160,9 +205,16 @@ fn fit_csv(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
             "leave it out; it is for a run",
         ));
     }
+    if args.in_blocks && chart != RayChart::Surface {
+        return Err(Failure::with_help(
+            "--in-blocks: samples of this chart are kept",
+            "leave it out; it is for the surface chart",
+        ));
+    }
     let optics = args.chart.optics(args.rig.as_deref().map(optics_of).transpose()?);
     let (scan, kept) = Scan::of(&args.source, &args.chart)?;
-    if kept.is_none() && args.picture.is_none() && dice.is_none() && scan.is_for_blocks() {
+    let is_streamed = kept.is_none() && args.picture.is_none() && dice.is_none();
+    if is_streamed && scan.is_for_blocks(args.in_blocks) {
         return fit_stream(args, rays, wanted, (&scan, optics, &wish));
     }
     let refused = |error: fit::FitError| Failure::with_help(format!("{shown}: {error}"), FIT_HELP);
@@ -243,16 +295,10 @@ fn fit_stream(
     let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
-    let truncation = if choice.is_some() {
-        "u of the radiance alone has a part for what the basis can't follow (truncation), by the choice: \
-         that of integrals takes all samples at once"
-    } else {
-        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
-    };
     let notes = [
         note_on_u(scan.has_u, args.u_relative),
-        "read in blocks, no sample kept".to_owned(),
-        truncation.to_owned(),
+        IN_BLOCKS.to_owned(),
+        truncation_note(choice.is_some()).to_owned(),
     ];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment = Treatment::of_readings(wish.rules.robust, treated, &[])
@@ -277,18 +323,35 @@ fn fit_stream(
 }
 
 fn write_and_show(args: &FitArgs, rays: Option<Vec<ListedRay>>, file: &FitFile<'_>) -> Outcome {
-    let folder = args.output.as_deref().map_or(Path::new(""), beside);
-    derive::write_tables(folder, file.derived).map_err(Failure::midway)?;
-    if let Some(path) = &args.output {
-        write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
-        if file.treatment.is_long() {
-            write_atomically(&folder.join("weights.csv"), |out| {
-                write_weights(out, file.quantity, &file.fit.region().chart, file.treatment)
-            })
-            .map_err(Failure::midway)?;
-        }
+    match &args.output {
+        Some(path) => write_fit(path, file)?,
+        None => derive::write_tables(Path::new(""), file.derived).map_err(Failure::midway)?,
     }
     show(args, rays, file, args.output.as_deref())
+}
+
+/// Writes fit.json, and beside it what is a file of its own.
+fn write_fit(path: &Path, file: &FitFile<'_>) -> Result<(), Failure> {
+    let folder = beside(path);
+    derive::write_tables(folder, file.derived).map_err(Failure::midway)?;
+    write_atomically(path, |out| file.write(out)).map_err(Failure::midway)?;
+    if file.treatment.is_long() {
+        write_atomically(&folder.join("weights.csv"), |out| {
+            write_weights(out, file.quantity, &file.fit.region().chart, file.treatment)
+        })
+        .map_err(Failure::midway)?;
+    }
+    Ok(())
+}
+
+/// What is said of truncation where no sample is kept.
+fn truncation_note(is_chosen: bool) -> &'static str {
+    if is_chosen {
+        "u of the radiance alone has a part for what the basis can't follow (truncation), by the choice: \
+         that of integrals takes all samples at once"
+    } else {
+        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
+    }
 }
 
 fn note_on_u(has_u: bool, u_relative: Option<f64>) -> String {

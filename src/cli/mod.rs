@@ -18,6 +18,7 @@ mod frontier;
 mod halt;
 mod hand;
 mod inputs;
+mod long_run;
 mod monte_carlo;
 mod nominal;
 mod outlook;

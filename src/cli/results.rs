@@ -60,7 +60,7 @@ impl Results {
         if let Some(optics) = &optics {
             calibrated.flag_off_sample(optics);
         }
-        let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, fitted));
+        let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, &fitted.fit));
         let (truth, score) = compared.unzip();
         let course = |fitted: &Fitted| {
             accuracy(&calibrated, &region, &fitted.fit, &wish.rules, optics.as_ref())
@@ -214,6 +214,13 @@ pub(crate) fn write_inputs(folder: &Path, setup: &Setup) -> Result<(), ExportErr
 
 /// Reads a run's folder: what it is made of, how it began, and its readings so far.
 pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), Failure> {
+    let (setup, header, reader) = open_run(folder)?;
+    let readings = reader.readings(Order::Taken)?;
+    Ok((setup, header, readings))
+}
+
+/// The same without the readings, and where they are to be had.
+pub(crate) fn open_run(folder: &Path) -> Result<(Setup, Header, Reader), Failure> {
     let reader = Reader::open(&folder.join(JOURNAL))?;
     let header = reader.header()?;
     let name = Some(header.plan_name.clone());
@@ -221,8 +228,7 @@ pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), F
         Setup::from_inputs(reader.inputs()?, name, header.seed, header.effect_wishes.clone())?
             .with_rounds(&reader)?;
     let setup = adapting::concluded(setup, &reader)?;
-    let readings = reader.readings(Order::Taken)?;
-    Ok((setup, header, readings))
+    Ok((setup, header, reader))
 }
 
 /// Readings of targets that the plan asks for, repeats counted.
@@ -243,10 +249,10 @@ pub(crate) fn optics(setup: &Setup) -> Option<Optics> {
 }
 
 /// What is true, and how far the fit lies from it.
-fn compare(setup: &Setup, region: &Region, fitted: &Fitted) -> Option<(Truth, Option<Score>)> {
+pub(crate) fn compare(setup: &Setup, region: &Region, fit: &Fit) -> Option<(Truth, Option<Score>)> {
     let truth = setup.truth()?;
     let radiance = |ray: &fit::Ray| truth.radiance(ray.x_m, ray.y_m, ray.theta_rad, ray.phi_rad);
-    let score = Score::of(region, |ray| fitted.fit.value(ray), radiance);
+    let score = Score::of(region, |ray| fit.value(ray), radiance);
     let stated = Truth {
         exitance: truth.exitance(),
         exitance_within_region: truth.exitance_within_region(),

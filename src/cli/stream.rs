@@ -114,13 +114,12 @@ impl Scan {
         }
     }
 
-    /// Whether the file is longer than what is kept.
-    pub(super) fn is_for_blocks(&self) -> bool {
-        self.samples > KEPT_MAX && self.is_surface
+    /// Whether the file is longer than what is kept, or not to be kept.
+    pub(super) fn is_for_blocks(&self, is_wanted: bool) -> bool {
+        (is_wanted || self.samples > KEPT_MAX) && self.is_surface
     }
 
-    /// The basis that is pinned, or that the sweeps which were kept ask for: where outliers are weighed,
-    /// those without them.
+    /// The basis that is pinned, or that the sweeps which were kept ask for.
     pub(super) fn model(
         &self,
         path: &Path,
@@ -130,14 +129,7 @@ impl Scan {
         let noise = self.noise(u_relative);
         let samples = self.gleaning.clone().into_samples().into_iter();
         let samples: Vec<Sample> = samples.map(|sample| known(sample, noise)).collect();
-        let chosen = if wish.rules.robust == Robust::None || wish.decided().is_some() {
-            fit::choose(&samples, &self.region, wish, optics)
-        } else {
-            let rules = Rules { robust: wish.rules.robust, ..Rules::default() };
-            let wish = Wish { rules, ..*wish };
-            fit::fit_wished(&Readings::of(&samples), &self.region, &wish, optics)
-                .map(|ruled| (ruled.fit.model(), ruled.choice))
-        };
+        let chosen = chosen(&samples, &self.region, wish, optics);
         chosen.map_err(|error| {
             // Whose sample is wrong is known by its line to a walk through the file alone.
             let asked = Asked {
@@ -188,6 +180,22 @@ impl Scan {
     }
 }
 
+/// The basis that is pinned, or that these samples ask for: where outliers are weighed, those without them.
+pub(super) fn chosen(
+    samples: &[Sample],
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<(Penalised, Option<Choice>), FitError> {
+    if wish.rules.robust == Robust::None || wish.decided().is_some() {
+        return fit::choose(samples, region, wish, optics);
+    }
+    let rules = Rules { robust: wish.rules.robust, ..Rules::default() };
+    let wish = Wish { rules, ..*wish };
+    fit::fit_wished(&Readings::of(samples), region, &wish, optics)
+        .map(|ruled| (ruled.fit.model(), ruled.choice))
+}
+
 fn known(sample: Sample, without_u: Noise) -> Sample {
     let noise = if sample.noise == Noise::Unknown { without_u } else { sample.noise };
     Sample { noise, ..sample }
@@ -204,9 +212,15 @@ struct LongCsv<'a> {
 }
 
 /// Why a walk did not come to its end.
-enum Stopped {
+pub(super) enum Stopped {
     Source(Failure),
     Fit(FitError),
+}
+
+impl From<Failure> for Stopped {
+    fn from(failure: Failure) -> Self {
+        Self::Source(failure)
+    }
 }
 
 impl From<FitError> for Stopped {
@@ -289,4 +303,4 @@ fn error_help<E>(error: &BlockError<E>, chart: RayChart) -> String {
 /// Before anything lies anywhere.
 const NOWHERE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 /// Fewer samples than this are kept rather than read again, and of more this many at most: some 10 MB.
-const KEPT_MAX: usize = 50_000;
+pub(super) const KEPT_MAX: usize = 50_000;

@@ -88,6 +88,9 @@ impl<'a> Fitting<'a> {
     ) -> Result<(), B::Error> {
         let Asked { optics, robust, .. } = self.asked;
         blocks.each(&mut |block| {
+            if block.samples.is_empty() {
+                return Ok(());
+            }
             let block = Readings { robust, ..*block };
             let readings = self.known.totals.readings;
             let design = Design::of_a_share(block.samples, &self.basis, optics, readings)?;
@@ -298,7 +301,7 @@ impl<'a> Fitting<'a> {
             let by = (self.known.model, shrink);
             let weighed = weighed_by(block, &settled, Vec::new(), by);
             let influence = Influence::of(design, &settled, solved, whole, watched.clone());
-            told(block, &Told { weighed, influence });
+            told(block, &Told { weighed, influence, levels: settled.levels });
             Ok(())
         })?;
         Ok(sums)

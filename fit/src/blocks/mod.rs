@@ -72,7 +72,7 @@ pub trait Blocks {
     /// Why they could not be had, or not be fitted.
     type Error: From<FitError>;
 
-    /// Hands all of them over, block by block, the same each time. Of every block the common components
+    /// Hands all of them over, block by block, the same each time; some may hold none. Of every block the common components
     /// and the nuisances are the same ones, in the same order; indices are the block's own, those of an
     /// error too. How outliers are weighed [`Asked`] says.
     fn each(
@@ -147,4 +147,6 @@ pub struct Told {
     pub weighed: Weighed,
     /// What they did to some quantities.
     pub influence: Influence,
+    /// What the field gives each reading.
+    pub levels: Vec<f64>,
 }

@@ -1,7 +1,7 @@
 //! What many samples share: being off by it shifts them all together, so that no average over them
 //! makes it smaller.
 
-use super::{Calibrated, Dark, Sample};
+use super::{Calibrated, Dark, Sample, Spread};
 use radiometry::beam::Beam;
 
 use crate::rig::{AXES, AxisName, AxisPositions, Misalignment, Pose, Rig, forward};
@@ -110,8 +110,8 @@ impl Calibrated {
     }
 }
 
-/// The components of a rig's samples, those with u = 0 left out.
-pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component> {
+/// The components of a rig's samples of such a spread, those with u = 0 left out.
+pub(super) fn of(rig: &Rig, darks: &[Dark], spread: &Spread) -> Vec<Component> {
     let detector = &rig.detector;
     let everywhere = Effect::Scale { gain: None };
     let mut all = vec![
@@ -123,21 +123,18 @@ pub(super) fn of(rig: &Rig, darks: &[Dark], samples: &[Sample]) -> Vec<Component
         let effect = beam.map_or(everywhere, |beam| Effect::Beam { beam });
         component(&format!("throughput @ {length}"), u, effect)
     }));
-    for dark in darks.iter().filter(|dark| samples.iter().any(|s| s.gain == dark.gain)) {
+    for dark in darks.iter().filter(|dark| spread.gains.contains(&dark.gain)) {
         let gain = &detector.gains[usize::from(dark.gain)];
         let scale = Effect::Scale { gain: Some(dark.gain) };
         all.push(component(&format!("gain {}", gain.name), gain.u_relative, scale));
         let offset = Effect::Offset { gain: dark.gain };
         all.push(component(&format!("dark {}", gain.name), dark.u_radiance, offset));
     }
-    let mut sessions: Vec<u32> = samples.iter().map(|sample| sample.session).collect();
-    sessions.sort_unstable();
-    sessions.dedup();
     for axis in &rig.axes {
         let name = axis.name.name();
         let zero = Effect::Axis { axis: axis.name, session: None };
         all.push(component(&format!("{name} zero"), axis.u_zero, zero));
-        for &session in &sessions {
+        for &session in &spread.sessions {
             let homing = Effect::Axis { axis: axis.name, session: Some(session) };
             all.push(component(&format!("{name} homing {session}"), axis.u_homing, homing));
         }

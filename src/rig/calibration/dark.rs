@@ -1,7 +1,9 @@
 //! The dark level of each gain range, and how well it is known.
 
+use std::collections::BTreeSet;
+
 use super::CalibrationError;
-use crate::rig::{Detector, ModelledVariance, Reading, ReadingKind, Rig};
+use crate::rig::{Detector, ModelledVariance, Reading, Rig};
 
 /// Dark readings scatter more than noise explains when chi2 exceeds its degrees of freedom by this
 /// many of its standard deviations, sqrt(2 dof).
@@ -25,16 +27,13 @@ pub struct Dark {
     pub u_radiance: f64,
 }
 
-/// The dark levels of all ranges in which something else was read, by range.
-pub(super) fn levels(rig: &Rig, readings: &[Reading]) -> Result<Vec<Dark>, CalibrationError> {
-    let mut gains: Vec<u8> = readings
-        .iter()
-        .filter(|reading| reading.kind != ReadingKind::Dark)
-        .map(|reading| reading.gain)
-        .collect();
-    gains.sort_unstable();
-    gains.dedup();
-    gains.into_iter().map(|gain| level(&rig.detector, gain, readings)).collect()
+/// The dark levels of the ranges in which something else was read, by range.
+pub(super) fn levels(
+    rig: &Rig,
+    gains: &BTreeSet<u8>,
+    dark: &[Reading],
+) -> Result<Vec<Dark>, CalibrationError> {
+    gains.iter().map(|gain| level(&rig.detector, *gain, dark)).collect()
 }
 
 /// What a reading's mean says of the radiance: dark level subtracted, negative where noise or a
@@ -47,12 +46,9 @@ pub(super) fn radiance(rig: &Rig, darks: &[Dark], reading: &Reading) -> (f64, Mo
     (current_a / detector.a_per_radiance(), variance)
 }
 
-fn level(detector: &Detector, gain: u8, readings: &[Reading]) -> Result<Dark, CalibrationError> {
-    let mut used: Vec<&Reading> = readings
-        .iter()
-        .filter(|reading| reading.kind == ReadingKind::Dark)
-        .filter(|reading| reading.gain == gain && reading.saturated == 0)
-        .collect();
+fn level(detector: &Detector, gain: u8, dark: &[Reading]) -> Result<Dark, CalibrationError> {
+    let is_used = |reading: &&Reading| reading.gain == gain && reading.saturated == 0;
+    let mut used: Vec<&Reading> = dark.iter().filter(is_used).collect();
     // The same sum, to the last bit, in whatever order they came.
     used.sort_by_key(|reading| reading.id);
     let n: f64 = used.iter().map(|reading| f64::from(reading.n)).sum();

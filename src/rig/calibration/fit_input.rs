@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use fit::{Common, Noise, Ray, Readings, Rules, Shift};
+use fit::{Common, FitError, Noise, Ray, Readings, Rules, Shift};
 
-use super::{Calibrated, Component, Effect, FittedDrift, Part, Sample, readback};
-use crate::rig::Pose;
+use super::readback::{self, Shared};
+use super::{Calibrated, Component, Effect, FittedDrift, Part, Reference, Sample, Spread};
+use crate::rig::{AxisName, Pose};
 
 /// What goes into a fit of a run's samples.
 #[derive(Debug)]
@@ -39,47 +40,96 @@ impl Calibrated {
     }
 
     fn input(&self, rules: &Rules, is_used: impl Fn(Part) -> bool) -> FitInput {
-        let places: Vec<usize> =
-            (0..self.samples.len()).filter(|&i| is_used(self.samples[i].part())).collect();
-        let used: Arc<[Sample]> = places.iter().map(|&i| self.samples[i].clone()).collect();
+        let used = self.samples.iter().filter(|sample| is_used(sample.part()));
+        let handing =
+            Handing::new(self.components.clone(), &self.references, &Spread::of(used), rules);
+        handing.input(&self.samples, is_used)
+    }
+}
+
+/// How samples are handed to the fit, all or some of them: what they share is known of all.
+#[derive(Debug, Clone)]
+pub struct Handing {
+    /// The drift by the reference readings, where it is fitted.
+    pub drift: Option<FittedDrift>,
+    /// Each with whether it is fitted along, and whether it concerns all samples alike.
+    components: Vec<(Component, bool, bool)>,
+    /// By axis.
+    shared: Vec<(AxisName, Shared)>,
+}
+
+impl Handing {
+    /// For samples of such a spread; of the components those that concern none are left out.
+    pub fn new(
+        components: Vec<Component>,
+        references: &[Reference],
+        spread: &Spread,
+        rules: &Rules,
+    ) -> Self {
         let drift = match rules.drift {
             Some(false) => None,
-            must => FittedDrift::of(&self.references, must == Some(true)),
+            must => FittedDrift::of(references, must == Some(true)),
         };
-        let sample = |sample: &Sample| {
-            let gain = 1.0 + drift.as_ref().map_or(0.0, |drift| drift.at(sample.middle_s()));
-            fit::Sample {
-                ray: sample.ray(),
-                value: sample.value / gain,
-                noise: Noise::Modelled {
-                    floor: sample.noise.floor / (gain * gain),
-                    per_radiance: sample.noise.per_radiance / gain,
-                },
-            }
+        let fits_ranges = rules.ranges.unwrap_or(spread.gains.len() > 1);
+        let handed = |component: Component| {
+            let is_range =
+                matches!(component.effect, Effect::Scale { gain: Some(_) } | Effect::Offset { .. });
+            let is_alike = spread.is_concerned_alike(&component);
+            (component, is_range && fits_ranges, is_alike)
         };
-        let samples = used.iter().map(sample).collect();
+        let components = components.into_iter().filter(|component| spread.is_concerned(component));
+        let components: Vec<_> = components.map(handed).collect();
+        let axes = components.iter().filter_map(|(component, _, _)| match component.effect {
+            Effect::Readback { axis } => Some((axis, Shared::of(spread, axis))),
+            _ => None,
+        });
+        Self { drift, shared: axes.collect(), components }
+    }
+
+    /// Refuses a drift that is asked for where the references don't tell it.
+    pub fn demand(&self, rules: &Rules) -> Result<(), FitError> {
+        demand_drift(self.drift.as_ref(), rules)
+    }
+
+    /// The samples of a part of the spread as the fit takes them, but those that have no part in it.
+    pub fn usable(&self, samples: &[Sample]) -> FitInput {
+        self.input(samples, |part| part != Part::None)
+    }
+
+    fn input(&self, samples: &[Sample], is_used: impl Fn(Part) -> bool) -> FitInput {
+        let places: Vec<usize> =
+            (0..samples.len()).filter(|&i| is_used(samples[i].part())).collect();
+        let used: Arc<[Sample]> = places.iter().map(|&i| samples[i].clone()).collect();
         let limits = (0..used.len()).filter(|&i| used[i].part() == Part::Limit).collect();
-        let first = used.first().map(|sample| sample.gain);
-        let has_ranges = used.iter().any(|sample| Some(sample.gain) != first);
-        let fits_ranges = rules.ranges.unwrap_or(has_ranges);
-        let mut nuisances: Vec<Common> =
-            drift.as_ref().map_or_else(Vec::new, |drift| drift.nuisances(&used));
+        let drift = self.drift.as_ref();
+        let mut nuisances = drift.map_or_else(Vec::new, |drift| drift.nuisances(&used));
         let mut shared = Vec::new();
-        for component in &self.components {
-            if !used.iter().any(|sample| component.concerns(sample)) {
-                continue;
-            }
+        for (component, is_fitted, is_alike) in &self.components {
             match component.effect {
                 Effect::Readback { axis } => {
-                    shared.extend(readback::components(component, axis, &used));
+                    let of = self.shared.iter().filter(|(name, _)| *name == axis);
+                    shared.extend(
+                        of.flat_map(|(_, of)| readback::components(component, axis, &used, of)),
+                    );
                 }
-                Effect::Scale { gain: Some(_) } | Effect::Offset { .. } if fits_ranges => {
-                    nuisances.push(common(component, &used));
-                }
-                _ => shared.push(common(component, &used)),
+                _ if *is_fitted => nuisances.push(common(component, &used, *is_alike)),
+                _ => shared.push(common(component, &used, *is_alike)),
             }
         }
-        FitInput { samples, limits, common: shared, nuisances, drift, places }
+        let samples = used.iter().map(|sample| self.sample(sample)).collect();
+        FitInput { samples, limits, common: shared, nuisances, drift: self.drift.clone(), places }
+    }
+
+    fn sample(&self, sample: &Sample) -> fit::Sample {
+        let gain = 1.0 + self.drift.as_ref().map_or(0.0, |drift| drift.at(sample.middle_s()));
+        fit::Sample {
+            ray: sample.ray(),
+            value: sample.value / gain,
+            noise: Noise::Modelled {
+                floor: sample.noise.floor / (gain * gain),
+                per_radiance: sample.noise.per_radiance / gain,
+            },
+        }
     }
 }
 
@@ -96,8 +146,16 @@ impl FitInput {
     }
 }
 
-fn common(component: &Component, used: &Arc<[Sample]>) -> Common {
-    let concerns_all = used.iter().all(|sample| component.concerns(sample));
+pub(super) fn demand_drift(drift: Option<&FittedDrift>, rules: &Rules) -> Result<(), FitError> {
+    if rules.drift != Some(true) || drift.is_some() {
+        return Ok(());
+    }
+    let missing = "it takes three reference readings or more, at different times, of a reference \
+                   that shines";
+    Err(FitError::Nuisance { name: "drift", missing })
+}
+
+fn common(component: &Component, used: &Arc<[Sample]>, concerns_all: bool) -> Common {
     let (samples, own) = (Arc::clone(used), component.clone());
     let shift = match component.effect {
         Effect::Scale { .. } if concerns_all => Shift::Scale,

@@ -7,6 +7,7 @@ use fit::{
 
 use fit::trials::Trials;
 
+use super::fit_input::demand_drift;
 use super::{Calibrated, FitInput, FittedDrift, Flag, Sample};
 
 /// A fit, what it was chosen from, and how many samples it does not rest on.
@@ -41,11 +42,7 @@ impl Calibrated {
         optics: Option<&Optics>,
     ) -> Result<Fitted, FitError> {
         let input = self.fit_input(&wish.rules);
-        if wish.rules.drift == Some(true) && input.drift.is_none() {
-            let missing = "it takes three reference readings or more, at different times, of a \
-                           reference that shines";
-            return Err(FitError::Nuisance { name: "drift", missing });
-        }
+        demand_drift(input.drift.as_ref(), &wish.rules)?;
         let flown = self.flown(&input);
         let readings = input.readings(&flown);
         let ruled = fit::fit_wished(&readings, region, wish, optics)?;

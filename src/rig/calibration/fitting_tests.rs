@@ -4,7 +4,7 @@
 use fit::{Contribution, Ray, Rules, Wish};
 
 use super::*;
-use crate::rig::Alignment;
+use crate::rig::{Alignment, ReadingKind};
 
 const DARK_A: f64 = 2e-11;
 
@@ -32,7 +32,7 @@ fn field(ray: &Ray) -> f64 {
 
 /// The readings of a run: every 16 targets the reference, dark ones before and after. `signal` makes what
 /// the detector sees at a time of what shines, `range` which range it is read in by the target's number.
-fn readings(
+pub(super) fn readings(
     rig: &Rig,
     seed: u64,
     signal: impl Fn(f64, f64) -> f64,
@@ -108,7 +108,7 @@ fn ray(pose: Pose) -> Ray {
 }
 
 /// The samples' rays, and a region that holds them.
-fn region(calibrated: &Calibrated) -> (Vec<Ray>, fit::Region) {
+pub(super) fn region(calibrated: &Calibrated) -> (Vec<Ray>, fit::Region) {
     let rays: Vec<Ray> = calibrated.samples.iter().map(Sample::ray).collect();
     let theta_max_rad = rays.iter().map(|ray| ray.theta_rad).fold(0.0, f64::max);
     let region = fit::Region::surface(

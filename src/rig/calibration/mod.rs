@@ -13,7 +13,10 @@
 //! It depends on the set of readings, not on their order, so that a resumed run gives the same
 //! samples. It corrects for no drift; it reports and flags it.
 
+#[cfg(test)]
+mod block_tests;
 mod budget;
+mod calibrating;
 mod component;
 mod dark;
 mod drift;
@@ -24,21 +27,24 @@ mod fitting_tests;
 mod readback;
 mod reference;
 mod sample;
+mod spread;
 #[cfg(test)]
 mod tests;
 
-pub use budget::IndependentParts;
+pub use budget::{IndependentParts, IndependentSums};
+pub use calibrating::{Calibration, FirstLook};
 pub use component::{Component, Effect};
 pub use dark::Dark;
 pub use drift::FittedDrift;
-pub use fit_input::FitInput;
+pub use fit_input::{FitInput, Handing};
 pub use fitting::Fitted;
 pub use reference::{Drift, Reference};
 pub use sample::{Flag, Flags, Part, Sample};
+pub use spread::Spread;
 
 use radiometry::direction;
 
-use super::{AxisPositions, Latched, Pose, Readback, Reading, ReadingKind, Rig, forward};
+use super::{AxisPositions, Latched, Pose, Readback, Reading, Rig, forward};
 
 /// What a run's readings amount to.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,19 +100,13 @@ pub enum CalibrationError {
 
 /// Turns a run's readings, all kinds in any order, into samples.
 pub fn calibrate(rig: &Rig, readings: &[Reading]) -> Result<Calibrated, CalibrationError> {
-    readings.iter().try_for_each(|reading| check(rig, reading))?;
-    let darks = dark::levels(rig, readings)?;
-    let mut references: Vec<Reference> = readings
-        .iter()
-        .filter(|reading| reading.kind == ReadingKind::Reference)
-        .map(|reading| reference::from_reading(rig, &darks, reading))
-        .collect();
-    references.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.id.cmp(&b.id)));
-    let mut samples: Vec<Sample> =
-        readings.iter().filter_map(|reading| sample::from_reading(rig, &darks, reading)).collect();
+    let mut look = FirstLook::default();
+    readings.iter().try_for_each(|reading| look.take(rig, reading))?;
+    let calibration = look.calibration(rig)?;
+    let mut samples = calibration.samples(readings);
     samples.sort_by_key(|sample| (sample.index, sample.repeat, sample.reading));
-    reference::flag_drift(&references, &mut samples);
-    let components = component::of(rig, &darks, &samples);
+    let components = component::of(rig, &calibration.darks, &Spread::of(&samples));
+    let Calibration { references, darks, .. } = calibration;
     Ok(Calibrated { samples, components, references, darks })
 }
 
@@ -184,18 +184,4 @@ impl Rig {
             phi_rad,
         }
     }
-}
-
-fn check(rig: &Rig, reading: &Reading) -> Result<(), CalibrationError> {
-    let (id, gain, count) = (reading.id, reading.gain, rig.detector.gains.len());
-    if usize::from(gain) >= count {
-        return Err(CalibrationError::NoSuchGain { id, gain, count });
-    }
-    if reading.n == 0 {
-        return Err(CalibrationError::Empty { id });
-    }
-    if !reading.mean.is_finite() {
-        return Err(CalibrationError::NotFinite { id, mean: reading.mean });
-    }
-    Ok(())
 }

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use proptest::prelude::*;
 
 use super::*;
-use crate::rig::{AxisName, ModelledVariance};
+use crate::rig::{AxisName, ModelledVariance, ReadingKind};
 
 const RELATIVE: f64 = 1e-12;
 

@@ -1,0 +1,217 @@
+//! `gonio fit` of a long run: its journal is walked through again and again, in blocks, as a long CSV is.
+//! Kept are its dark and reference readings, the positions of axes that its samples have, and whole sweeps to
+//! choose a basis from.
+
+use std::cell::RefCell;
+
+use fit::blocks::{Asked, Blocks, Blockwise, Totals};
+use fit::{FitError, Gleaning, Optics, Readings, Ruled, Wish};
+
+use super::failure::Failure;
+use super::fit::FIT_HELP;
+use super::results::{fit_region, optics};
+use super::setup::Setup;
+use super::stream::{self, KEPT_MAX, Stopped};
+use crate::export::TreatedReadings;
+use crate::journal::Reader;
+use crate::rig::Reading;
+use crate::rig::calibration::{
+    Calibration, FirstLook, FittedDrift, Handing, IndependentParts, IndependentSums, Part, Sample,
+    Spread,
+};
+
+/// What a run's fit says that was made in blocks.
+pub(super) struct LongFit {
+    pub(super) ruled: Ruled,
+    pub(super) drift: Option<FittedDrift>,
+    pub(super) nuisances: Vec<fit::FittedNuisance>,
+    pub(super) treated: TreatedReadings,
+    pub(super) independent: IndependentParts,
+    pub(super) n_flagged: usize,
+    pub(super) n_excluded: usize,
+}
+
+/// A journal, and what three looks at it found.
+struct LongRun<'a> {
+    reader: &'a Reader,
+    calibration: Calibration<'a>,
+    handing: Handing,
+    totals: Totals,
+    /// Whole sweeps of those that are no limits.
+    gleaning: Gleaning,
+    /// Those that have no part in the fit; each is flagged.
+    left_out: TreatedReadings,
+    n_excluded: usize,
+}
+
+/// The samples of the block that is looked at, and which of them are used.
+#[derive(Default)]
+struct Block {
+    samples: Vec<Sample>,
+    places: Vec<usize>,
+}
+
+/// Fits a run by its journal, a block at a time.
+pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit, Failure> {
+    let run = LongRun::open(setup, reader, wish)?;
+    run.handing.demand(&wish.rules).map_err(|error| refused(&error))?;
+    let (region, optics) = (fit_region(setup), optics(setup));
+    let samples = run.gleaning.clone().into_samples();
+    let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())
+        .map_err(|error| refused(&error))?;
+    let asked = Asked { region, model, robust: wish.rules.robust, optics: optics.as_ref() };
+    let (Blockwise { fit, nuisances }, closing) = run.fit(&asked)?;
+    let ruled = fit.clone().ruled(&wish.rules).map_err(|error| refused(&error))?;
+    let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();
+    let independent = closing.sums.parts(&ruled.fit);
+    Ok(LongFit {
+        ruled: Ruled { choice, ..ruled },
+        drift: run.handing.drift.clone(),
+        nuisances,
+        treated: closing.treated,
+        independent: if is_as_fitted { independent } else { IndependentParts::NONE },
+        n_flagged: closing.n_flagged,
+        n_excluded: run.n_excluded,
+    })
+}
+
+/// What the last walk sums up.
+struct Closing {
+    sums: IndependentSums,
+    treated: TreatedReadings,
+    n_flagged: usize,
+}
+
+impl<'a> LongRun<'a> {
+    fn open(setup: &'a Setup, reader: &'a Reader, wish: &Wish) -> Result<Self, Failure> {
+        let mut look = FirstLook::default();
+        each_block(reader, |block| {
+            block
+                .iter()
+                .try_for_each(|reading| look.take(&setup.rig, reading))
+                .map_err(Failure::midway)
+        })?;
+        let calibration = look.calibration(&setup.rig).map_err(Failure::midway)?;
+        let mut spread = Spread::default();
+        each_block::<Failure>(reader, |block| {
+            let samples = calibration.samples(block);
+            samples.iter().filter(|s| s.part() != Part::None).for_each(|s| spread.take(s));
+            Ok(())
+        })?;
+        let components = calibration.components(&spread);
+        let handing = Handing::new(components, &calibration.references, &spread, &wish.rules);
+        let mut run = Self {
+            reader,
+            calibration,
+            handing,
+            totals: Totals::default(),
+            gleaning: Gleaning::new(KEPT_MAX),
+            left_out: TreatedReadings::default(),
+            n_excluded: 0,
+        };
+        each_block::<Failure>(reader, |block| {
+            run.count(block);
+            Ok(())
+        })?;
+        Ok(run)
+    }
+
+    fn count(&mut self, block: &[Reading]) {
+        let samples = self.calibration.samples(block);
+        let input = self.handing.usable(&samples);
+        self.totals.take(&input.readings(&[]));
+        let is_limit = |i: usize| input.limits.binary_search(&i).is_ok();
+        let plain = input.samples.iter().enumerate().filter(|(i, _)| !is_limit(*i));
+        self.gleaning.take(&plain.map(|(_, sample)| *sample).collect::<Vec<_>>());
+        for sample in samples.iter().filter(|sample| sample.part() == Part::None) {
+            self.left_out.leave_out(u64::from(sample.reading), sample.ray(), sample.value);
+            self.n_excluded += 1;
+        }
+    }
+
+    fn fit(&self, asked: &Asked<'_>) -> Result<(Blockwise, Closing), Failure> {
+        let mut closing = Closing {
+            sums: IndependentSums::default(),
+            treated: self.left_out.clone(),
+            n_flagged: self.n_excluded,
+        };
+        let block = RefCell::<Block>::default();
+        let mut walk = Walk { run: self, block: &block };
+        let fitted = fit::blocks::fit(&mut walk, &self.totals, asked, &mut |_, told| {
+            let Block { samples, places } = &mut *block.borrow_mut();
+            // As they are stated where all are there: at the level of the fit.
+            for (place, level) in places.iter().zip(&told.levels) {
+                samples[*place].state_at(*level);
+            }
+            closing.sums.take(places.iter().map(|place| &samples[*place]), &told.influence);
+            let named = |sample: &Sample| (u64::from(sample.reading), sample.ray(), sample.value);
+            closing.treated.take(&told.weighed, |i| named(&samples[places[i]]));
+            let is_flagged =
+                |sample: &Sample| !sample.flags.is_empty() || is_off_sample(asked.optics, sample);
+            let flagged = places.iter().filter(|place| is_flagged(&samples[**place]));
+            closing.n_flagged += flagged.count();
+        });
+        let fitted = fitted.map_err(|stopped| match stopped {
+            Stopped::Source(failure) => failure,
+            Stopped::Fit(error) => refused(&error),
+        })?;
+        Ok((fitted, closing))
+    }
+}
+
+fn is_off_sample(optics: Option<&Optics>, sample: &Sample) -> bool {
+    optics.is_some_and(|optics| optics.reaches_beyond(&sample.ray()))
+}
+
+fn refused(error: &FitError) -> Failure {
+    Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}"))
+}
+
+/// A journal's readings as the fit takes them.
+struct Walk<'a> {
+    run: &'a LongRun<'a>,
+    block: &'a RefCell<Block>,
+}
+
+impl Blocks for Walk<'_> {
+    type Error = Stopped;
+
+    fn each(
+        &mut self,
+        take: &mut dyn FnMut(&Readings<'_>) -> Result<(), FitError>,
+    ) -> Result<(), Stopped> {
+        each_block(self.run.reader, |readings| {
+            let samples = self.run.calibration.samples(readings);
+            let input = self.run.handing.usable(&samples);
+            let flown: Vec<_> = input.places.iter().map(|i| samples[*i].flown()).collect();
+            let place = |i: usize| input.places[i];
+            let ids: Vec<u32> = samples.iter().map(|sample| sample.reading).collect();
+            self.block.replace(Block { places: input.places.clone(), samples });
+            take(&input.readings(&flown)).map_err(|error| match error.index() {
+                Some(i) => Stopped::Source(Failure::midway(format!(
+                    "fit: reading {}: {error}\n  help: {FIT_HELP}",
+                    ids[place(i)]
+                ))),
+                None => Stopped::Fit(error),
+            })
+        })
+    }
+}
+
+/// Hands the readings of a journal on, as they were taken.
+fn each_block<E: From<Failure>>(
+    reader: &Reader,
+    mut take: impl FnMut(&[Reading]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut last = 0;
+    loop {
+        let block = reader.readings_after(last, BLOCK_READINGS).map_err(Failure::from)?;
+        let Some((position, _)) = block.last() else { return Ok(()) };
+        last = *position;
+        let readings: Vec<Reading> = block.into_iter().map(|(_, reading)| reading).collect();
+        take(&readings)?;
+    }
+}
+
+/// Enough for what a block costs beside its rows, few enough for a hundred components' effects on each.
+const BLOCK_READINGS: u32 = 128;
