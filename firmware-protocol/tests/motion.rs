@@ -86,29 +86,7 @@ proptest! {
         stop_us in 0..6_000_000_u64,
         late in any::<bool>(),
     ) {
-        let mut bench = Bench::homed();
-        let start = bench.now;
-        let to = Bench::targets_in_travel(to);
-        bench.core.board_mut().answers_late = late;
-        bench.accept(move_to(to));
-        for _ in 0..stop_us / 100_000 {
-            bench.pass_us(100_000);
-            bench.ask(&Request::KeepAlive);
-        }
-        bench.pass_us(stop_us % 100_000);
-        bench.core.board_mut().answers_late = false;
-        bench.ask(&Request::Stop);
-        bench.run();
-        let status = bench.core.status(bench.now);
-        prop_assert!(!status.moving && status.homed.0 == 0b1111);
-        if !late {
-            check_tracks(&bench, start, [0; 4])?;
-        }
-        for (channel, &target) in to.iter().enumerate() {
-            let place = bench.core.board().places[channel];
-            let target = f64::from(target);
-            prop_assert!(place >= target.min(0.0) && place <= target.max(0.0));
-        }
+        stops_well(to, stop_us, late)?;
     }
 
     #[test]
@@ -124,6 +102,40 @@ proptest! {
         prop_assert!((whole - distance).abs() <= 1e-14 * distance);
         prop_assert!(profile.travelled(t) <= t * speed * (1.0 + 1e-14));
     }
+}
+
+/// Sends all axes to parts of their travel, and stops them on the way.
+fn stops_well(to: [f64; 4], stop_us: u64, late: bool) -> Result<(), TestCaseError> {
+    let mut bench = Bench::homed();
+    let start = bench.now;
+    let to = Bench::targets_in_travel(to);
+    bench.core.board_mut().answers_late = late;
+    bench.accept(move_to(to));
+    for _ in 0..stop_us / 100_000 {
+        bench.pass_us(100_000);
+        bench.ask(&Request::KeepAlive);
+    }
+    bench.pass_us(stop_us % 100_000);
+    bench.core.board_mut().answers_late = false;
+    bench.ask(&Request::Stop);
+    bench.run();
+    let status = bench.core.status(bench.now);
+    prop_assert!(!status.moving && status.homed.0 == 0b1111);
+    if !late {
+        check_tracks(&bench, start, [0; 4])?;
+    }
+    for (channel, &target) in to.iter().enumerate() {
+        let place = bench.core.board().places[channel];
+        let target = f64::from(target);
+        prop_assert!(place >= target.min(0.0) && place <= target.max(0.0));
+    }
+    Ok(())
+}
+
+#[test]
+fn an_axis_that_comes_to_rest_within_the_last_microsecond_keeps_its_limits() {
+    let to = [0.568_518_498_763_548, 0.762_492_037_287_291_6, 0.0, 0.021_545_642_195_131_94];
+    stops_well(to, 5_094_152, false).unwrap();
 }
 
 /// The setpoints that an axis got, with their times.
@@ -154,6 +166,9 @@ fn check_tracks(bench: &Bench, start: Instant, from: [i32; 4]) -> Result<(), Tes
             let change = (velocity - velocity_before).abs();
             let allowed = f64::from(axis.acceleration) * between;
             let rounding = ROUNDING / seconds + ROUNDING / seconds_before.max(seconds);
+            // A path ends within a microsecond, and is said to have ended at its end: over the last
+            // stretch it was faster than its mean by as much.
+            let rounding = rounding + velocity.abs() * 1e-6 / seconds;
             prop_assert!(change <= allowed + rounding, "channel {channel}: {change} > {allowed}");
             let is_within = pair[1].1 >= f64::from(axis.low) && pair[1].1 <= f64::from(axis.high);
             prop_assert!(is_within, "channel {channel} at {}", pair[1].1);
