@@ -52,6 +52,80 @@ fn a_run_is_as_accurate_as_its_plan_said() {
 }
 
 #[test]
+fn what_the_plan_s_features_leave_is_said_with_its_range_and_what_lies_beyond_with_it() {
+    let bench = expecting().with("plan.toml", "[expect]", "[expect]\nnarrowest_feature_deg = 60");
+    let said = bench.gonio(&["plan", "plan.toml"]).well();
+    for part in ["within 80.0°", "not foretold: 3.02 % of the exitance", "--rehearse"] {
+        assert!(said.out.contains(part), "{part}: {said}");
+    }
+    let json = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    for quantity in ["radiance", "exitance_w_per_m2", "exitance_within_region_w_per_m2"] {
+        let of = |key: &str| number(&json, &format!("/uncertainty/{quantity}/{key}"));
+        let (least, most) = (of("truncation_range_relative/0"), of("truncation_range_relative/1"));
+        let truncation = of("truncation_relative");
+        assert!(0.0 < least && least < truncation && truncation < most, "{quantity}: {json}");
+        let (low, high) = (of("u_range_relative/0"), of("u_range_relative/1"));
+        assert!(low < of("u_relative") && of("u_relative") < high, "{quantity}: {json}");
+        let not_shared = of("independent_relative").hypot(truncation);
+        assert!((of("not_shared_relative") / not_shared - 1.0).abs() < 1e-12, "{json}");
+    }
+    let beyond = number(&json, "/uncertainty/exitance_beyond_region_relative");
+    assert!((beyond - 10.0_f64.to_radians().sin().powi(2)).abs() < 1e-9, "{beyond}");
+}
+
+/// An even field under a fit of degree 2 has no truncation, a lobe has much: of neither the plan says
+/// anything.
+#[test]
+fn a_rehearsal_foretells_what_the_fits_of_runs_state() {
+    let lobe = "kind = \"cosine-power\"\nexponent = 6";
+    for lobed in [false, true] {
+        let bench = if lobed {
+            expecting().with("scene.toml", "kind = \"lambertian\"", lobe)
+        } else {
+            expecting()
+        };
+        let words = ["plan", "plan.toml", "--rehearse", "2", "--seed", "11", "--json"];
+        let json = bench.gonio(&words).well().json();
+        let run = bench.gonio(&["run", "plan.toml", "--out", "run", "--json"]).well().json();
+        let fit: Value = serde_json::from_str(&bench.text("run/fit.json")).unwrap();
+        assert_eq!(json["rehearsal"]["runs"], 2);
+        for (quantity, said) in [("exitance", &run), ("exitance_within_region", &fit)] {
+            let of = |key: &str| number(said, &format!("/{quantity}_w_per_m2/{key}"));
+            let foretold = number(&json, &format!("/rehearsal/{quantity}/u_relative"));
+            let factor = of("u") / of("value") / foretold;
+            assert!((1.0 / 1.3..1.3).contains(&factor), "{quantity}: {factor}\n{json}");
+        }
+        let first = bench.text("run/readings.csv");
+        let time = |line: &str| line.split(',').nth(time_column(&first)).unwrap().parse::<f64>();
+        let first_s = first.lines().skip(1).map(|line| time(line).unwrap());
+        let took_s = number(&run, "/rig_s") - first_s.fold(f64::INFINITY, f64::min);
+        let foretold_s = number(&json, "/rehearsal/after_homing_s");
+        assert!((took_s / foretold_s - 1.0).abs() < 1e-3, "{took_s} s, {foretold_s} s foretold");
+        let off = |quantity: &str| number(&json, &format!("/rehearsal/{quantity}/error_relative"));
+        assert_eq!(lobed, off("radiance") > 0.02, "{json}");
+        if lobed {
+            let plan = number(&json, "/uncertainty/exitance_w_per_m2/u_relative");
+            assert!(number(&json, "/rehearsal/exitance/u_relative") > 1.3 * plan, "{json}");
+        }
+    }
+}
+
+fn time_column(csv: &str) -> usize {
+    csv.lines().next().unwrap().split(',').position(|name| name == "time_s").unwrap()
+}
+
+#[test]
+fn a_real_rig_is_rehearsed_on_its_simulated_twin() {
+    let bench = Bench::small().at_port("/dev/nowhere");
+    let words = ["plan", "plan.toml", "--rehearse", "1", "--scene", "scene.toml"];
+    let said = bench.gonio(&words).well();
+    assert!(said.out.contains("rehearsed once before scene.toml"), "{said}");
+    // Without a scene there is nothing to rehearse before.
+    bench.gonio(&words[..4]).refused(&["a simulated rig needs a scene", "--scene"]);
+    bench.gonio(&["plan", "plan.toml", "--rehearse", "0"]).refused(&["--rehearse", "0"]);
+}
+
+#[test]
 fn an_assumed_level_says_so() {
     let bench = Bench::small();
     let said = bench.gonio(&["plan", "plan.toml"]).well();

@@ -77,9 +77,12 @@ impl Program {
 }
 
 impl Run {
-    /// A number of its document, by the path of keys that leads to it.
+    /// A number of its document, by the path of keys and places in lists that leads to it.
     pub fn number(&self, keys: &str) -> Result<f64, Unmeasured> {
-        let found = keys.split('.').try_fold(&self.json, |value, key| value.get(key));
+        let found = keys.split('.').try_fold(&self.json, |value, key| match key.parse::<usize>() {
+            Ok(place) => value.get(place),
+            Err(_) => value.get(key),
+        });
         found.and_then(Value::as_f64).ok_or_else(|| {
             Unmeasured::because(format!("the program's JSON has no number at {keys}"))
         })

@@ -221,18 +221,26 @@ impl Fit {
     /// The exitance within the cone θ <= `theta_max_rad` about the normal, mean over the region.
     /// An angle outside [0, π/2] is refused, in charts of the whole sphere one outside [0, π].
     pub fn exitance_within(&self, theta_max_rad: f64) -> Result<Estimate, DomainError> {
-        let own = self.basis.exitance_within(theta_max_rad)?;
-        let within = |basis: &Basis| basis.exitance_within(theta_max_rad);
-        let beyond = self.beyond.as_ref().map(within).transpose()?.unwrap_or_default();
-        Ok(self.estimate(&Functional::new(own, beyond)))
+        Ok(self.estimate(&self.sum_within(theta_max_rad)?))
     }
 
     /// The exitance within the region's own cone, mean over the region: what rests on measurement.
     pub fn exitance_within_region(&self) -> Estimate {
+        self.estimate(&self.sum_within_region())
+    }
+
+    fn sum_within(&self, theta_max_rad: f64) -> Result<Functional, DomainError> {
+        let own = self.basis.exitance_within(theta_max_rad)?;
+        let within = |basis: &Basis| basis.exitance_within(theta_max_rad);
+        let beyond = self.beyond.as_ref().map(within).transpose()?.unwrap_or_default();
+        Ok(Functional::new(own, beyond))
+    }
+
+    fn sum_within_region(&self) -> Functional {
         let is_whole = self.region().chart.is_whole_sphere();
         let end_rad = if is_whole { PI } else { FRAC_PI_2 };
         let theta_max_rad = self.region().theta_max_rad.min(end_rad);
-        self.exitance_within(theta_max_rad).unwrap_or_else(|_| self.exitance())
+        self.sum_within(theta_max_rad).unwrap_or_else(|_| self.exitance_sum())
     }
 
     /// The flux that leaves the region: exitance times its area, in the values' unit times m² sr.
@@ -278,6 +286,11 @@ impl Fit {
     /// The exitance's uncertainty by source, the independent part first.
     pub fn contributions(&self) -> Vec<Contribution> {
         self.budget(&self.exitance_sum())
+    }
+
+    /// The same of the exitance within the region's own cone.
+    pub fn contributions_within_region(&self) -> Vec<Contribution> {
+        self.budget(&self.sum_within_region())
     }
 
     /// The uncertainty of the radiance along a ray by source, the independent part first.

@@ -35,6 +35,18 @@ pub struct FittedField {
     pub residual_rms: f64,
 }
 
+impl Predicted {
+    /// The radiance along a ray: of the expected field's fit, then of each field's. The functions are worked
+    /// out once for all of them.
+    pub fn values(&self, ray: &Ray) -> Vec<f64> {
+        let basis = self.fit.functions();
+        let mut row = vec![0.0; basis.len()];
+        basis.row(ray, &mut basis.scratch(), &mut row);
+        let fits = std::iter::once(&self.fit).chain(self.fields.iter().map(|field| &field.fit));
+        fits.map(|fit| dot(&row, fit.coefficients())).collect()
+    }
+}
+
 /// Predicts the fit of [`fit_flown`](crate::fit_flown). A sample's `value` is the radiance that is expected along
 /// its ray; of a beam that reaches beyond the sample only the part on it sees that much. Its noise
 /// is taken at that level. `fields` are the radiances of other fields along the same rays, one a

@@ -29,6 +29,7 @@ mod picture;
 mod plan;
 mod ports;
 mod progress;
+mod rehearsal;
 mod remote;
 mod report;
 mod results;

@@ -5,8 +5,12 @@ use serde_json::{Value, json};
 
 use super::setup::Setup;
 use super::text::{percent, table};
+use crate::plan::Region;
 use crate::rig::Quantity;
-use crate::study::{Budget, Forecast, ForecastError};
+use crate::study::{Budget, Forecast, ForecastError, Truncation};
+
+/// Of the exitance beyond the region less is not worth a word.
+const BEYOND_MIN: f64 = 1e-3;
 
 /// Asks.
 pub(crate) fn outlook(setup: &Setup) -> Result<Forecast, ForecastError> {
@@ -41,7 +45,7 @@ fn undetermined(error: &fit::FitError) -> String {
 }
 
 /// What the uncertainties hold for, and a table of them.
-pub(crate) fn text(forecast: &Forecast, quantity: Quantity) -> String {
+pub(crate) fn text(forecast: &Forecast, region: Region, quantity: Quantity) -> String {
     let [unit, ..] = quantity.units();
     let from = if forecast.prior.is_declared {
         "[expect]"
@@ -52,16 +56,19 @@ pub(crate) fn text(forecast: &Forecast, quantity: Quantity) -> String {
     let mut said = format!("\n  predicted u, relative (k = 1), at {level:.4} {unit} ({from})\n");
     let heads = ["", "all", "without scale", "independent", "truncation", "largest part"];
     let mut rows = vec![heads.map(str::to_owned).to_vec()];
-    for (name, budget) in
-        [("exitance, flux", &forecast.of_exitance), ("radiance, RMS", &forecast.of_radiance)]
-    {
+    let within = format!("within {:.1}°", region.theta_max_rad.to_degrees());
+    for (name, budget) in [
+        ("exitance, flux", &forecast.of_exitance),
+        (&within, &forecast.of_exitance_within_region),
+        ("radiance, RMS", &forecast.of_radiance),
+    ] {
         let (largest, u) = budget.largest(true);
         rows.push(vec![
             name.to_owned(),
             percent(budget.u()),
             percent(budget.u_without_scale()),
             percent(budget.independent),
-            budget.truncation.map_or_else(|| "not asked".to_owned(), percent),
+            budget.truncation.map_or_else(|| "not asked".to_owned(), truncation),
             format!("{largest} {}", percent(u)),
         ]);
     }
@@ -71,10 +78,33 @@ pub(crate) fn text(forecast: &Forecast, quantity: Quantity) -> String {
         percent(forecast.radiance_worst_without_scale),
     ]);
     said.push_str(&table(&rows));
+    said.push_str(&not_foretold(forecast, &within));
+    said
+}
+
+/// The mean over the features, and from those of one shape to those of the other.
+fn truncation(truncation: Truncation) -> String {
+    let Truncation { u, least, most } = truncation;
+    format!("{} ({} to {})", percent(u), percent(least), percent(most))
+}
+
+/// What the numbers don't hold.
+fn not_foretold(forecast: &Forecast, within: &str) -> String {
+    let mut said = String::new();
     if forecast.of_radiance.truncation.is_none() {
         said.push_str(
             "  truncation: state expect.narrowest_feature_deg (or _mm) to have it predicted\n",
         );
+    }
+    if forecast.beyond_region >= BEYOND_MIN {
+        said.push_str("  not foretold: ");
+        said.push_str(&percent(forecast.beyond_region));
+        said.push_str(
+            " of the exitance lies beyond what is measured; a fit that finds structure states a \
+             larger\n  u of the whole, and beside it that ",
+        );
+        said.push_str(within);
+        said.push_str(". --rehearse shows it\n");
     }
     said
 }
@@ -94,6 +124,8 @@ pub(crate) fn as_json(forecast: &Forecast, quantity: Quantity) -> Value {
             "stated_in_plan": forecast.prior.is_declared, "saturates": forecast.saturates,
         },
         quantity.exitance_key(): exitance,
+        quantity.exitance_within_region_key(): budget(&forecast.of_exitance_within_region),
+        "exitance_beyond_region_relative": forecast.beyond_region,
         quantity.flux_key(): flux,
         "radiance": worst,
     })
@@ -106,7 +138,11 @@ fn budget(budget: &Budget) -> Value {
         "u_relative": budget.u(),
         "u_relative_without_scale": budget.u_without_scale(),
         "independent_relative": budget.independent,
-        "truncation_relative": budget.truncation,
+        "u_range_relative": budget.range(),
+        "not_shared_relative": budget.not_shared(),
+        "truncation_relative": budget.truncation.map(|truncation| truncation.u),
+        "truncation_range_relative":
+            budget.truncation.map(|truncation| [truncation.least, truncation.most]),
         "common_relative": common,
     })
 }

@@ -1,4 +1,5 @@
-//! `gonio plan`: what a plan means on its rig, and what it costs. Moves nothing.
+//! `gonio plan`: what a plan means on its rig, and what it costs. Moves nothing but a simulated rig, where
+//! a rehearsal is asked for.
 
 use std::process::ExitCode;
 
@@ -8,6 +9,7 @@ use super::args::{EffectArgs, PlanArgs};
 use super::failure::Outcome;
 use super::outlook::{self, outlook, warning};
 use super::output::{note, say, say_json};
+use super::rehearsal::{Rehearsal, rehearse};
 use super::setup::Setup;
 use super::target;
 use super::text::{duration, percent, row, table};
@@ -17,17 +19,26 @@ use crate::study::{Forecast, ForecastError};
 
 /// Checks a plan and prints its prediction.
 pub(crate) fn plan(args: &PlanArgs) -> Outcome {
-    let setup = Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?;
+    let setup = match args.rehearse {
+        Some(_) => Setup::for_rehearsal(&args.plan, &args.rig)?,
+        None => Setup::from_disk(&args.plan, &args.rig, &EffectArgs::default())?,
+    };
     if !args.target.is_empty() {
         return target::plan(args, &setup);
     }
     target::check_unused(args)?;
     let prediction = &setup.sequence.prediction;
     let outlook = outlook(&setup);
+    let rehearsal = args.rehearse.map(|runs| rehearse(&setup, runs)).transpose()?;
     if args.json {
-        say_json(&as_json(&setup, prediction, &outlook))?;
+        let mut said = as_json(&setup, prediction, &outlook);
+        if let Some(rehearsal) = &rehearsal {
+            said["rehearsal"] = rehearsal.as_json();
+        }
+        say_json(&said)?;
     } else {
-        say(&as_text(&setup, prediction, &outlook))?;
+        let rehearsed = rehearsal.as_ref().map(Rehearsal::text).unwrap_or_default();
+        say(&(as_text(&setup, prediction, &outlook) + &rehearsed))?;
     }
     if let Some(warning) = warning(&outlook) {
         note(&warning);
@@ -82,7 +93,7 @@ fn as_text(
     let mut text = table(&rows);
     match outlook {
         Ok(forecast) => {
-            text.push_str(&outlook::text(forecast, setup.rig.detector.quantity));
+            text.push_str(&outlook::text(forecast, setup.region(), setup.rig.detector.quantity));
         }
         // The fit's own refusal is a warning of its own.
         Err(ForecastError::Fit(_)) => {}

@@ -59,6 +59,8 @@ struct Choice {
     scene: Option<PathBuf>,
     seed: u64,
     wishes: EffectWishes,
+    /// Whether a real rig's simulated twin takes its place.
+    is_rehearsal: bool,
 }
 
 impl Setup {
@@ -73,6 +75,19 @@ impl Setup {
             scene: args.scene.clone(),
             seed: args.seed,
             wishes: effects.wishes(),
+            is_rehearsal: false,
+        };
+        Self::build(Inputs::from_disk(), plan, choice, None)
+    }
+
+    /// The same on the rig's simulated twin, before the scene that the arguments or the plan name.
+    pub(crate) fn for_rehearsal(plan: &Path, args: &RigArgs) -> Result<Self, Failure> {
+        let choice = Choice {
+            rig: args.rig.clone(),
+            scene: args.scene.clone(),
+            seed: args.seed,
+            is_rehearsal: true,
+            ..Choice::default()
         };
         Self::build(Inputs::from_disk(), plan, choice, None)
     }
@@ -113,7 +128,10 @@ impl Setup {
     ) -> Result<Self, Failure> {
         let plan = Plan::read(inputs.document(InputRole::Plan, plan_path)?)?;
         let plan_name = plan.name.clone().or(plan_name).unwrap_or_else(|| folder_name(plan_path));
-        let rig = read_rig(&mut inputs, plan_path, &plan, &choice)?;
+        let mut rig = read_rig(&mut inputs, plan_path, &plan, &choice)?;
+        if choice.is_rehearsal {
+            rig = rig.twin();
+        }
         let (list, sequence) = lay_out(&mut inputs, plan_path, &plan, &rig)?;
         let plan_hash = plan.hash(&sequence);
         let Choice { seed, ref wishes, .. } = choice;

@@ -70,6 +70,13 @@ impl Rig {
         self.devices.as_ref().map_or(0.0, |devices| devices.answer_s(readings))
     }
 
+    /// Its simulated twin: the same axes and detector on a simulated link, and simulated devices where it is put
+    /// together of them.
+    #[must_use]
+    pub fn twin(&self) -> Self {
+        Self { link: Link::Simulated { baud: self.link.baud() }, ..self.clone() }
+    }
+
     /// Whether what a plan would take in flight is taken at rest: a meter of another make does not
     /// integrate while axes pass.
     pub fn takes_sweeps_at_rest(&self) -> bool {

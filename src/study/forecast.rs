@@ -7,8 +7,8 @@
 
 use fit::{BasisSpec, FitError, Noise, Optics, Penalised, Predicted, Sample, Shift};
 
-use super::parts::{Budget, over_region};
-use super::prior::{Feature, Prior, ray, region};
+use super::parts::{Budget, Parts};
+use super::prior::{Feature, Features, Prior, ray, region};
 use crate::plan::{Plan, Sequence, Step};
 use crate::rig::calibration::{Calibrated, Effect, FitInput, calibrate};
 use crate::rig::{AxisPositions, Latched, Reading, ReadingKind, Rig, forward};
@@ -36,8 +36,13 @@ pub struct Forecast {
     pub exitance: f64,
     /// The flux that is expected.
     pub flux: f64,
-    /// Of exitance and flux, relative to them. They differ by the region's area alone.
+    /// Of exitance and flux, relative to them. They differ by the region's area alone. What lies beyond the
+    /// region is extrapolated as far as the basis goes, and no further foretold.
     pub of_exitance: Budget,
+    /// Of the exitance into the region's own cone: what rests on measurement.
+    pub of_exitance_within_region: Budget,
+    /// The part of the expected exitance that lies beyond it.
+    pub beyond_region: f64,
     /// Of the radiance, root mean square over the region (weighted by throughput), relative to the
     /// root mean square of the expected radiance.
     pub of_radiance: Budget,
@@ -142,7 +147,7 @@ impl Forecast {
         jitter(rig, &features, &calibrated, &mut samples);
         let fields: Vec<Vec<f64>> = features
             .iter()
-            .flatten()
+            .flat_map(Features::iter)
             .map(|feature| samples.iter().map(|sample| feature.radiance(&sample.ray)).collect())
             .collect();
         let (region, optics) = (region(plan), optics.as_ref());
@@ -156,7 +161,8 @@ impl Forecast {
                 fit::predict(&samples, &flown, &region, model, &common, optics, &[])?.fit;
         }
         let scales = scales(&calibrated);
-        let (of_exitance, of_radiance, worst) = over_region(&prior, &features, &predicted, &scales);
+        let Parts { of_exitance, of_exitance_within_region, beyond_region, of_radiance, worst } =
+            Parts::of(&prior, &features, &predicted, &scales);
         let fit = &predicted.fit;
         Ok(Self {
             prior,
@@ -166,6 +172,8 @@ impl Forecast {
             exitance: fit.exitance().value,
             flux: fit.flux().value,
             of_exitance,
+            of_exitance_within_region,
+            beyond_region,
             of_radiance,
             radiance_worst: worst[0],
             radiance_worst_without_scale: worst[1],
@@ -225,12 +233,7 @@ fn photoelectrons(samples: &[Sample]) -> f64 {
 
 /// Each position is known to its axis's readback alone: where a feature is steep that is noise. What it
 /// does to the expected field is among the components.
-fn jitter(
-    rig: &Rig,
-    features: &[Vec<Feature>; 2],
-    calibrated: &Calibrated,
-    samples: &mut [Sample],
-) {
+fn jitter(rig: &Rig, features: &[Features; 2], calibrated: &Calibrated, samples: &mut [Sample]) {
     for (sample, own) in samples.iter_mut().zip(&calibrated.samples) {
         let AxisPositions(at) = own.positions;
         let mut variance = 0.0;
@@ -249,7 +252,7 @@ fn jitter(
 
 /// The variance that the basis leaves of what is expected, where it shows beside the noise: the
 /// expected field's own, and the mean over the features of each kind.
-fn misfit(predicted: &Predicted, features: &[Vec<Feature>; 2], samples: &[Sample]) -> Option<f64> {
+fn misfit(predicted: &Predicted, features: &[Features; 2], samples: &[Sample]) -> Option<f64> {
     let mut variance = predicted.fit.residual_rms().powi(2);
     let mut fields = predicted.fields.iter();
     for kind in features.iter().filter(|kind| !kind.is_empty()) {

@@ -10,10 +10,12 @@ mod demand;
 mod forecast;
 mod frontier;
 mod ladder;
+mod missed;
 mod motion;
 mod nodes;
 mod parts;
 mod prior;
+mod rehearsal;
 mod score;
 mod search;
 mod trend;
@@ -25,10 +27,12 @@ pub use frontier::{
     doubling, points,
 };
 pub use ladder::{LADDER, Rung};
+pub use missed::Truncation;
 pub use motion::Motion;
 pub use nodes::{Fineness, Nodes};
 pub use parts::Budget;
-pub use prior::{Feature, Prior};
+pub use prior::{Feature, Features, Prior};
+pub use rehearsal::{Likely, Rehearsed, Stated};
 pub use score::{Score, median, percent};
 pub use search::{Candidate, Considered, Found, Search, SearchError};
 pub use trend::{Reach, Trend};

@@ -1,18 +1,14 @@
 //! The parts of a predicted uncertainty, and how they are gathered over a region.
 
-use fit::{Angular, Fit, FittedField, Position, Predicted, Ray, Region};
-use radiometry::quadrature::gauss_legendre;
+use fit::{Angular, Contribution, Fit, Position, Predicted, Ray, Region};
 
-use super::prior::{Feature, Prior};
+use super::missed::{Truncation, missed, rule};
+use super::prior::{Features, Prior};
 
 /// Nodes of the rule over the directions of a region, at most; and in each of x and y.
 const THETA_NODES_MAX: usize = 24;
 const PHI_NODES_MAX: u32 = 48;
 const POSITION_NODES_MAX: usize = 9;
-/// Nodes across a feature's field, where its truncation is looked at.
-const FIELD_THETA_NODES: usize = 40;
-const FIELD_PHI_NODES: u32 = 120;
-const FIELD_POSITION_NODES: usize = 16;
 /// Directions round the region's edge at which the largest u is looked for.
 const EDGE_DIRECTIONS: u32 = 12;
 
@@ -25,13 +21,31 @@ pub struct Budget {
     pub common: Vec<(String, f64, bool)>,
     /// By what the basis can't follow of the narrowest feature, or of the expected field; `None`
     /// where the plan declares neither.
-    pub truncation: Option<f64>,
+    pub truncation: Option<Truncation>,
 }
 
 impl Budget {
     /// All parts.
     pub fn u(&self) -> f64 {
         libm::sqrt(self.squares(true))
+    }
+
+    /// All parts, with the truncation of the shape that the basis follows better, and of the other.
+    pub fn range(&self) -> [f64; 2] {
+        let with = |truncation: fn(&Truncation) -> f64| {
+            let as_if = |t: &Truncation| Truncation { u: truncation(t), ..*t };
+            Self { truncation: self.truncation.as_ref().map(as_if), ..self.clone() }.u()
+        };
+        [with(|t| t.least), with(|t| t.most)]
+    }
+
+    /// What readings do not share: their noise, and what the basis can't follow. As the u of a fit.
+    pub fn not_shared(&self) -> f64 {
+        libm::hypot(self.independent, self.truncation_u())
+    }
+
+    fn truncation_u(&self) -> f64 {
+        self.truncation.map_or(0.0, |truncation| truncation.u)
     }
 
     /// All parts but the scale that is common to all readings.
@@ -47,8 +61,7 @@ impl Budget {
     /// The largest part, by its name; of those that count.
     pub fn largest(&self, with_scale: bool) -> (&str, f64) {
         let common = self.common.iter().filter(|(_, _, is_scale)| with_scale || !is_scale);
-        let own =
-            [("independent", self.independent), ("truncation", self.truncation.unwrap_or(0.0))];
+        let own = [("independent", self.independent), ("truncation", self.truncation_u())];
         own.into_iter()
             .chain(common.map(|(name, u, _)| (name.as_str(), *u)))
             .fold(("independent", 0.0), |most, part| if part.1 > most.1 { part } else { most })
@@ -57,37 +70,67 @@ impl Budget {
     fn squares(&self, with_scale: bool) -> f64 {
         let common = self.common.iter().filter(|(_, _, is_scale)| with_scale || !is_scale);
         self.independent.powi(2)
-            + self.truncation.unwrap_or(0.0).powi(2)
+            + self.truncation_u().powi(2)
             + common.map(|(_, u, _)| u * u).sum::<f64>()
     }
 }
 
-/// The budgets of exitance and radiance, and the radiance's largest u with and without the scale.
-pub(super) fn over_region(
+/// What is foretold, gathered.
+pub(super) struct Parts {
+    pub(super) of_exitance: Budget,
+    pub(super) of_exitance_within_region: Budget,
+    /// The part of the expected exitance beyond the region's cone.
+    pub(super) beyond_region: f64,
+    pub(super) of_radiance: Budget,
+    /// The radiance's largest u, with and without the scale.
+    pub(super) worst: [f64; 2],
+}
+
+impl Parts {
+    pub(super) fn of(
+        prior: &Prior,
+        features: &[Features; 2],
+        predicted: &Predicted,
+        scales: &[String],
+    ) -> Self {
+        let fit = &predicted.fit;
+        let missed = missed(prior, features, predicted);
+        let is_scale = |name: &str| scales.iter().any(|scale| scale == name);
+        let (exitance, within) = (fit.exitance().value, fit.exitance_within_region().value);
+        let (of_radiance, level, worst) = over_region(prior, fit, &is_scale);
+        let of = |rows: Vec<Contribution>, whole: f64| Budget::of_rows(rows, whole, &is_scale);
+        Self {
+            of_exitance: Budget {
+                truncation: missed.map(|missed| missed.exitance.over(exitance)),
+                ..of(fit.contributions(), exitance)
+            },
+            of_exitance_within_region: Budget {
+                truncation: missed.map(|missed| missed.within.over(within)),
+                ..of(fit.contributions_within_region(), within)
+            },
+            beyond_region: 1.0 - within / exitance,
+            of_radiance: Budget {
+                truncation: missed.map(|missed| missed.radiance.over(level)),
+                ..of_radiance
+            },
+            worst,
+        }
+    }
+}
+
+/// The radiance's budget but for truncation, the root mean square that it is relative to, and its largest u
+/// with and without the scale.
+fn over_region(
     prior: &Prior,
-    features: &[Vec<Feature>; 2],
-    predicted: &Predicted,
-    scales: &[String],
-) -> (Budget, Budget, [f64; 2]) {
-    let fit = &predicted.fit;
+    fit: &Fit,
+    is_scale: &dyn Fn(&str) -> bool,
+) -> (Budget, f64, [f64; 2]) {
     let nodes = nodes_of_fit(fit);
     let area: f64 = nodes.iter().map(|(_, weight)| weight).sum();
-    let mean = |f: &dyn Fn(&Ray) -> f64| -> f64 {
-        nodes.iter().map(|(ray, weight)| weight * f(ray)).sum::<f64>() / area
-    };
-    let level = libm::sqrt(mean(&|ray| prior.radiance(ray.theta_rad).powi(2)));
-    let exitance = fit.exitance().value;
-    let [truncation_m, truncation_l] = truncation(prior, features, predicted, exitance, level);
-    let is_scale = |name: &str| scales.iter().any(|scale| scale == name);
+    let of_ray = |(ray, weight): &(Ray, f64)| weight * prior.radiance(ray.theta_rad).powi(2);
+    let level = libm::sqrt(nodes.iter().map(of_ray).sum::<f64>() / area);
 
-    let mut of_exitance = Budget { truncation: truncation_m, ..Budget::default() };
-    of_exitance.independent = fit.exitance().u_independent / exitance;
-    for part in fit.contributions().into_iter().skip(1) {
-        let scale = is_scale(&part.name);
-        of_exitance.common.push((part.name, part.u / exitance, scale));
-    }
-
-    let mut squares: Vec<(String, f64)> = Vec::new();
+    let mut rows: Vec<Contribution> = Vec::new();
     let mut worst = [0.0_f64; 2];
     for (ray, weight) in nodes.into_iter().chain(edge(fit.region())) {
         let (mut all, mut apart) = (0.0, 0.0);
@@ -96,78 +139,31 @@ pub(super) fn over_region(
             all += square;
             apart += if is_scale(&part.name) { 0.0 } else { square };
             // The rows are the same along every ray, in the same order.
-            if squares.len() == i {
-                squares.push((part.name, 0.0));
+            if rows.len() == i {
+                rows.push(Contribution { u: 0.0, ..part });
             }
-            squares[i].1 += weight / area * square;
+            rows[i].u += weight / area * square;
         }
         worst = [worst[0].max(all), worst[1].max(apart)];
     }
-    let mut rms = squares.into_iter().map(|(name, square)| (name, libm::sqrt(square) / level));
-    let independent = rms.next().map_or(0.0, |(_, u)| u);
-    let with_kind = |(name, u): (String, f64)| {
-        let scale = is_scale(&name);
-        (name, u, scale)
-    };
-    let common = rms.map(with_kind).collect();
-    let of_radiance = Budget { independent, common, truncation: truncation_l };
-
-    (of_exitance, of_radiance, worst.map(|square| libm::sqrt(square) / level))
+    for row in &mut rows {
+        row.u = libm::sqrt(row.u);
+    }
+    let worst = worst.map(|square| libm::sqrt(square) / level);
+    (Budget::of_rows(rows, level, is_scale), level, worst)
 }
 
-/// By how much the fit of what is expected, and of a feature of each kind on average, is off.
-fn truncation(
-    prior: &Prior,
-    features: &[Vec<Feature>; 2],
-    predicted: &Predicted,
-    exitance: f64,
-    level: f64,
-) -> [Option<f64>; 2] {
-    let region = predicted.fit.region();
-    let mut squares = [0.0; 2];
-    let mut is_known = false;
-    if prior.exponent > 0.0 {
-        is_known = true;
-        let rules = [in_directions(region, region.theta_max_rad), in_directions(region, HORIZON)];
-        add(&mut squares, off(&predicted.fit, &|ray| prior.radiance(ray.theta_rad), rules), 1);
+impl Budget {
+    /// Of contributions, the independent one first, over what they are relative to.
+    fn of_rows(rows: Vec<Contribution>, whole: f64, is_scale: &dyn Fn(&str) -> bool) -> Self {
+        let mut rows = rows.into_iter();
+        let independent = rows.next().map_or(0.0, |row| row.u / whole);
+        let common = rows.map(|row| {
+            let scale = is_scale(&row.name);
+            (row.name, row.u / whole, scale)
+        });
+        Self { independent, common: common.collect(), truncation: None }
     }
-    let mut fields = predicted.fields.iter();
-    for (kind, features) in features.iter().enumerate() {
-        let fitted: Vec<&FittedField> = fields.by_ref().take(features.len()).collect();
-        for (feature, field) in features.iter().zip(fitted) {
-            is_known = true;
-            let rule = |theta_max_rad: f64| match kind {
-                0 => in_directions(region, theta_max_rad),
-                _ => in_positions(region, theta_max_rad),
-            };
-            let rules = [rule(region.theta_max_rad), rule(HORIZON)];
-            let error = off(&field.fit, &|ray| feature.radiance(ray), rules);
-            add(&mut squares, error, features.len());
-        }
-    }
-    let [m, l] = squares.map(libm::sqrt);
-    if is_known { [Some(m / exitance), Some(l / level)] } else { [None, None] }
-}
-
-const HORIZON: f64 = core::f64::consts::FRAC_PI_2;
-
-fn add(squares: &mut [f64; 2], errors: [f64; 2], among: usize) {
-    for (square, error) in squares.iter_mut().zip(errors) {
-        *square += error * error / among as f64;
-    }
-}
-
-/// By how much a fit's exitance and radiance (root mean square) are off a field; by rules over the
-/// region and over the hemisphere.
-fn off(fit: &Fit, field: &dyn Fn(&Ray) -> f64, rules: [Vec<(Ray, f64)>; 2]) -> [f64; 2] {
-    let [region, hemisphere] = rules;
-    let share = |rule: &[(Ray, f64)], f: &dyn Fn(&Ray) -> f64| -> f64 {
-        let whole: f64 = rule.iter().map(|(_, weight)| weight).sum();
-        rule.iter().map(|(ray, weight)| weight * f(ray)).sum::<f64>() / whole
-    };
-    let square = share(&region, &|ray| (fit.value(ray) - field(ray)).powi(2));
-    let exitance = core::f64::consts::PI * share(&hemisphere, field);
-    [(fit.exitance().value - exitance).abs(), libm::sqrt(square)]
 }
 
 /// A rule fine enough for the square of a function of the fit: u² is a polynomial of twice its
@@ -188,40 +184,6 @@ fn nodes_of_fit(fit: &Fit) -> Vec<(Ray, f64)> {
     let theta = (degree / 2 + 1).min(THETA_NODES_MAX);
     let phi = u32::try_from(2 * degree + 1).unwrap_or(PHI_NODES_MAX).min(PHI_NODES_MAX);
     rule(fit.region(), fit.region().theta_max_rad, (theta, phi, places.min(POSITION_NODES_MAX)))
-}
-
-fn in_directions(region: &Region, theta_max_rad: f64) -> Vec<(Ray, f64)> {
-    rule(region, theta_max_rad, (FIELD_THETA_NODES, FIELD_PHI_NODES, 1))
-}
-
-fn in_positions(region: &Region, theta_max_rad: f64) -> Vec<(Ray, f64)> {
-    rule(region, theta_max_rad, (2, 4, FIELD_POSITION_NODES))
-}
-
-/// Rays and weights by throughput: Gauss-Legendre in sin²θ and in x and y, the trapezoid in φ.
-fn rule(
-    region: &Region,
-    theta_max_rad: f64,
-    (theta, phi, position): (usize, u32, usize),
-) -> Vec<(Ray, f64)> {
-    let scale = |(low, high): (f64, f64), t: f64| low + (high - low) * 0.5 * (1.0 + t);
-    let sin2_max = libm::sin(theta_max_rad).powi(2);
-    let line = gauss_legendre(position);
-    let mut rule = Vec::new();
-    for (t, weight_theta) in gauss_legendre(theta) {
-        let theta_rad = libm::asin(libm::sqrt(scale((0.0, sin2_max), t)));
-        for k in 0..phi {
-            let phi_rad = core::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(phi);
-            for (tx, weight_x) in &line {
-                for (ty, weight_y) in &line {
-                    let (x_m, y_m) = (scale(region.x_m, *tx), scale(region.y_m, *ty));
-                    let ray = Ray { x_m, y_m, theta_rad, phi_rad };
-                    rule.push((ray, weight_theta * weight_x * weight_y));
-                }
-            }
-        }
-    }
-    rule
 }
 
 /// Rays where a fit is held worst: round the region's edge at its corners and its middle, and along

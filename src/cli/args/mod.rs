@@ -243,6 +243,10 @@ pub(crate) struct PlanArgs {
     /// Write the plan that was found; must not exist yet.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// Rehearse the plan so many times before a scene that is likely (--scene, or the plan's own): whole runs
+    /// on a simulated twin of the rig, in virtual time, and what their fits state. Also of a real rig.
+    #[arg(long, value_name = "RUNS", conflicts_with = "target", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) rehearse: Option<u64>,
     /// Print one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
