@@ -6,7 +6,7 @@
 //! the stated noise; from these the next walk makes each reading's weight anew: outliers', limits', and of
 //! noise that goes with the level. Each pass of a fit in memory is two walks, one for the scatter and one for
 //! the rows, with the same functions; so both come to the same field. They differ by rounding, by the
-//! [sums](sketch) that stand for single residuals where there is scatter beyond the stated noise, and over a
+//! sums that stand for single residuals where there is scatter beyond the stated noise, and over a
 //! beam by the rule that averages a row, which goes with the block's readings (a tenth of u at most).
 //!
 //! ```
