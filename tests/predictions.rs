@@ -276,3 +276,32 @@ fn a_frontier_says_what_can_not_be_swept() {
     frontier(&["--strategy", "sweep", "--dwell", "0.05"]).refused(&["windows", "the wire carries"]);
     assert!(!bench.path("f").exists());
 }
+
+/// Two axes move at once while readings are taken; the fit knows where they were.
+#[test]
+fn a_spiral_is_flown_as_its_plan_says() {
+    let spiral = "kind = \"spiral\"\nx_count = 2\ny_count = 2\ninterleaved = true\ntheta_step_deg = 20\n\
+                  narrowest_feature_deg = 40";
+    let raster = "kind = \"raster\"\nx_count = 2\ny_count = 2\ntheta_step_deg = 20\n\
+                  phi_step_deg = 45\norder = \"travel\"";
+    let long = "dwell_ms = 200\ngain";
+    let bench = expecting().with("plan.toml", "dwell_ms = 20\ngain", long);
+    let bench = bench.with("plan.toml", raster, spiral).with(
+        "scene.toml",
+        "kind = \"lambertian\"",
+        "kind = \"cosine-power\"\nexponent = 2",
+    );
+    let plan = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    let foretold_s = number(&plan, "/time_s/total") - number(&plan, "/time_s/homing");
+    // Four turns and the rim, dealt out over four places.
+    assert_eq!(plan["sweeps"]["count"], 5);
+    let run = bench.gonio(&["run", "plan.toml", "--out", "run", "--json"]).well().json();
+    let csv = bench.text("run/readings.csv");
+    let time = |line: &str| line.split(',').nth(time_column(&csv)).unwrap().parse::<f64>();
+    let first_s = csv.lines().skip(1).map(|line| time(line).unwrap());
+    let took_s = number(&run, "/rig_s") - first_s.fold(f64::INFINITY, f64::min);
+    assert!((took_s / foretold_s - 1.0).abs() < 1e-3, "{took_s} s, {foretold_s} s foretold");
+    assert_eq!(run["targets_measured"], run["targets_planned"]);
+    // Even cosines are polynomials on the disk: what is left is the scale's 0.5 %, and zeros of axes.
+    assert!(number(&run, "/truth/radiance_error_rms_relative") < 0.02, "{run}");
+}

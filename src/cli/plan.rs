@@ -148,7 +148,7 @@ fn decided_on_the_way(setup: &Setup) -> Option<Vec<String>> {
 fn sweeps(setup: &Setup) -> Option<String> {
     let (sequence, rig) = (&setup.sequence, &setup.rig);
     let window = sequence.steps.iter().find(|step| step.swept.is_some())?;
-    let [theta, ..] = sequence.speeds(rig);
+    let [theta, phi, ..] = sequence.speeds(rig);
     let travel = rig.axes[0].distance(f64::from(window.swept?.travel.0[0])).abs();
     if rig.takes_sweeps_at_rest() {
         return Some(format!(
@@ -158,11 +158,18 @@ fn sweeps(setup: &Setup) -> Option<String> {
             window.dwell.as_secs_f64() * 1e3,
         ));
     }
+    let window_ms = window.dwell.as_secs_f64() * 1e3;
+    if phi > 0.0 {
+        return Some(format!(
+            "{} round a spiral, the table at {:.2}°/s at most, windows of {window_ms:.1} ms",
+            sequence.sweeps(),
+            phi.to_degrees(),
+        ));
+    }
     Some(format!(
-        "{} at {:.2}°/s, windows of {:.1} ms and {:.3}°",
+        "{} at {:.2}°/s, windows of {window_ms:.1} ms and {:.3}°",
         sequence.sweeps(),
         theta.to_degrees(),
-        window.dwell.as_secs_f64() * 1e3,
         travel.to_degrees(),
     ))
 }

@@ -64,7 +64,7 @@ impl Plan {
         let expect = root.table("expect")?.map(Expect::read).transpose()?.unwrap_or_default();
         let (schedule, order, repeat, window) =
             read_schedule(root.required_table("schedule")?, &expect)?;
-        let is_flown = matches!(schedule, Schedule::Sweep { .. } | Schedule::Adaptive(_));
+        let is_flown = is_flown(&schedule);
         let (dwell, allocation, gain) = read_dwell(root.required_table("dwell")?, is_flown)?;
         let dwell = window.unwrap_or(dwell);
         // Rounds close with both whatever comes between: a sweep alone has a hundred windows.
@@ -194,6 +194,8 @@ fn read_sample(table: Table<'_>, region: &Region) -> Result<Outline, Problem> {
 /// maximum of the narrowest feature that is looked for (default: `[expect]`'s), or
 /// `speed_deg_per_s`; `window_ms` (default: `dwell.dwell_ms`); `interleaved`, whether each meridian
 /// is flown at one of the places alone (default false). Sweeps have their own order ·
+/// spiral: the same with `theta_step_deg`, between turns, in the place of `phi_step_deg`, and without a speed:
+/// each turn has its own ·
 /// adaptive: see [`Adaptive::read`].
 /// Then `order` travel (default; listed for a list) or listed, and `repeat` (default 1).
 fn read_schedule(
@@ -208,6 +210,7 @@ fn read_schedule(
         LowDiscrepancy,
         Quadrature,
         Raster,
+        Spiral,
         Sweep,
     }
     let words = [
@@ -217,6 +220,7 @@ fn read_schedule(
         ("quadrature", Kind::Quadrature),
         ("list", Kind::List),
         ("sweep", Kind::Sweep),
+        ("spiral", Kind::Spiral),
         ("adaptive", Kind::Adaptive),
     ];
     let count = |key: &str| read_count(&table, key, COUNT_MAX);
@@ -243,13 +247,14 @@ fn read_schedule(
         },
         Kind::List => Schedule::List { file: table.required_text("file")?.to_owned() },
         Kind::Sweep => read_sweep(&table, expect)?,
+        Kind::Spiral => read_spiral(&table, expect)?,
         Kind::Adaptive => Schedule::Adaptive(Adaptive::read(&table, expect)?),
     };
-    if matches!(schedule, Schedule::Sweep { .. } | Schedule::Adaptive(_)) {
+    if is_flown(&schedule) {
         let window = table.number("window_ms", DWELL_MS)?.map(millis);
         let repeat = match schedule {
-            Schedule::Sweep { .. } => table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole),
-            _ => 1,
+            Schedule::Adaptive(_) => 1,
+            _ => table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole),
         };
         table.finish()?;
         return Ok((schedule, Order::Listed, repeat, window));
@@ -259,6 +264,30 @@ fn read_schedule(
     let repeat = table.integer("repeat", 1..=REPEAT_MAX)?.map_or(1, whole);
     table.finish()?;
     Ok((schedule, order, repeat, None))
+}
+
+/// Whether readings are taken in flight.
+fn is_flown(schedule: &Schedule) -> bool {
+    matches!(schedule, Schedule::Adaptive(_) | Schedule::Spiral { .. } | Schedule::Sweep { .. })
+}
+
+fn read_spiral(table: &Table<'_>, expect: &Expect) -> Result<Schedule, Problem> {
+    let expected_deg = expect.narrowest_feature_rad.map(f64::to_degrees);
+    let narrowest_feature_deg = table.number("narrowest_feature_deg", STEP_DEG)?.or(expected_deg);
+    Ok(Schedule::Spiral {
+        x_count: read_count(table, "x_count", COUNT_MAX)?,
+        y_count: read_count(table, "y_count", COUNT_MAX)?,
+        theta_step_deg: table.required_number("theta_step_deg", STEP_DEG)?,
+        is_interleaved: table.flag("interleaved")?.unwrap_or(false),
+        narrowest_feature_deg: narrowest_feature_deg.ok_or_else(|| {
+            table.problem(
+                "narrowest_feature_deg",
+                "nothing says how fast to turn",
+                "the full width at half maximum of the narrowest feature that is looked for",
+                "state narrowest_feature_deg, here or in [expect]: the speed follows from it and the beam",
+            )
+        })?,
+    })
 }
 
 fn read_sweep(table: &Table<'_>, expect: &Expect) -> Result<Schedule, Problem> {

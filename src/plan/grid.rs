@@ -31,7 +31,10 @@ pub(super) fn poses(schedule: &Schedule, region: &Region) -> Vec<Pose> {
             tensor(&places, &phis, &thetas(gamma_step_deg, region))
         }
         // Sweeps have their poses from the rig's counts.
-        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => Vec::new(),
+        Schedule::Adaptive(_)
+        | Schedule::List { .. }
+        | Schedule::Spiral { .. }
+        | Schedule::Sweep { .. } => Vec::new(),
         Schedule::LowDiscrepancy { count } => (0..count).map(|i| evenly(i, region)).collect(),
         Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
             let xs = nodes(region.x_m, x_count);
@@ -75,7 +78,10 @@ pub(super) fn count(schedule: &Schedule, region: &Region) -> u64 {
         Schedule::CGamma { x_count, y_count, c_step_deg, gamma_step_deg } => {
             grid(x_count, y_count, gamma_step_deg, c_step_deg)
         }
-        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => 0,
+        Schedule::Adaptive(_)
+        | Schedule::List { .. }
+        | Schedule::Spiral { .. }
+        | Schedule::Sweep { .. } => 0,
         Schedule::LowDiscrepancy { count } => u64::from(count),
         Schedule::Quadrature { x_count, y_count, theta_count, phi_count } => {
             let directions = u64::from(theta_count) * u64::from(phi_count);

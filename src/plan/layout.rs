@@ -11,7 +11,7 @@ use super::builder::{Builder, Place, step};
 use super::order::{self, Visit};
 use super::{
     DarkMethod, Order, Plan, Prediction, READINGS_MAX, Region, Schedule, Sequence, TARGETS_MAX,
-    Target, grid, list, sweep,
+    Target, grid, list, spiral, sweep,
 };
 use crate::rig::{AxisPositions, LimitError, Pose, ReadingKind, Rig};
 
@@ -36,7 +36,9 @@ impl Plan {
         self.check_expected(rig)?;
         let reference = self.reference_on(rig)?;
         match self.schedule {
-            Schedule::Sweep { .. } => return self.lay_out_sweeps(rig, gain, reference),
+            Schedule::Spiral { .. } | Schedule::Sweep { .. } => {
+                return self.lay_out_sweeps(rig, gain, reference);
+            }
             Schedule::Adaptive(adaptive) => {
                 return self.lay_out_first_round(rig, &adaptive, gain, reference);
             }
@@ -60,7 +62,10 @@ impl Plan {
     }
 
     fn lay_out_sweeps(&self, rig: &Rig, gain: u8, reference: Place) -> Result<Sequence, Problem> {
-        let lines = sweep::lines(self, rig)?;
+        let lines = match self.schedule {
+            Schedule::Spiral { .. } => spiral::lines(self, rig)?,
+            _ => sweep::lines(self, rig)?,
+        };
         let targets = sweep::targets(rig, &lines);
         self.check_readings(targets.len())?;
         let mut builder = Builder::new(self, rig, gain, reference);

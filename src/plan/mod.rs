@@ -31,6 +31,7 @@ mod order;
 mod rewrite;
 mod round;
 mod sequence;
+mod spiral;
 mod sweep;
 #[cfg(test)]
 mod sweep_tests;

@@ -27,7 +27,7 @@ const PART_OF_WIRE: f64 = 0.8;
 /// Bits on the wire for a byte.
 const BITS_PER_BYTE: f64 = 10.0;
 /// How much slower a sweep is tried whose run-up has no room.
-const SLOWER: f64 = 0.9;
+pub(super) const SLOWER: f64 = 0.9;
 /// How often the plan's window is doubled where light is scarce, and up to what.
 const DOUBLINGS: u32 = 5;
 const WINDOW_MAX: Duration = Duration::from_secs(1);
@@ -215,7 +215,7 @@ pub(super) fn reaches_over(plan: &Plan, rig: &Rig) -> bool {
 }
 
 /// Rows of places, back and forth.
-fn places(plan: &Plan, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
+pub(super) fn places(plan: &Plan, x_count: u32, y_count: u32) -> Vec<(f64, f64)> {
     let mut places = grid::places(&plan.region, x_count, y_count);
     for (column, ys) in places.chunks_mut(y_count as usize).enumerate() {
         if column % 2 == 1 {
@@ -287,7 +287,7 @@ fn cut_by(rig: &Rig, theta: (f64, f64), travel: i32, window: Duration) -> Vec<(F
 }
 
 /// What the acceleration excites dies away in the axis's time to settle; and play is used up.
-fn lead(rig: &Rig, axis: &Axis, travel: i32, window: Duration) -> Duration {
+pub(super) fn lead(rig: &Rig, axis: &Axis, travel: i32, window: Duration) -> Duration {
     let settle = axis.settle;
     if axis.approach == Approach::Either {
         return settle;
@@ -298,7 +298,7 @@ fn lead(rig: &Rig, axis: &Axis, travel: i32, window: Duration) -> Duration {
     settle.max(Duration::from_secs_f64(missing_s))
 }
 
-fn window_s(rig: &Rig, window: Duration) -> f64 {
+pub(super) fn window_s(rig: &Rig, window: Duration) -> f64 {
     let adc = rig.detector.adc;
     f64::from(adc.readings_in(window)) / f64::from(adc.rate_hz)
 }
@@ -339,10 +339,11 @@ fn free_travel(plan: &Plan, rig: &Rig, window: Duration) -> i32 {
 }
 
 /// How far a window may go for the sake of the narrowest feature, radians.
-fn borne(plan: &Plan, rig: &Rig) -> f64 {
+pub(super) fn borne(plan: &Plan, rig: &Rig) -> f64 {
     let narrowest_feature_deg = match plan.schedule {
         Schedule::Sweep { narrowest_feature_deg, .. } => narrowest_feature_deg,
-        Schedule::Adaptive(Adaptive { narrowest_feature_deg, .. }) => Some(narrowest_feature_deg),
+        Schedule::Adaptive(Adaptive { narrowest_feature_deg, .. })
+        | Schedule::Spiral { narrowest_feature_deg, .. } => Some(narrowest_feature_deg),
         _ => return 0.0,
     };
     let detector = &rig.detector;
@@ -385,7 +386,7 @@ fn pinned_speed(plan: &Plan) -> Option<f64> {
 
 /// Whole counts, none too many.
 #[allow(clippy::cast_possible_truncation)] // saturates
-fn whole(axis: &Axis, units: f64) -> i32 {
+pub(super) fn whole(axis: &Axis, units: f64) -> i32 {
     libm::floor(units * axis.counts_per_unit * (1.0 + 1e-9)) as i32
 }
 
@@ -435,9 +436,9 @@ pub(super) fn check_places(plan: &Plan, rig: &Rig, lines: &[Line]) -> Result<(),
     Ok(())
 }
 
-fn no_room(plan: &Plan, axis: &Axis, rejection: Rejection) -> Problem {
+pub(super) fn no_room(plan: &Plan, axis: &Axis, rejection: Rejection) -> Problem {
     let what = match rejection {
-        Rejection::OutsideLimits(0, counts) => format!(
+        Rejection::OutsideLimits(_, counts) => format!(
             "{}: coming to speed and to rest, a sweep would reach {}, outside the travel from {} to {}",
             axis.name.name(),
             axis.name.in_file_unit(axis.position(f64::from(counts))),

@@ -112,6 +112,20 @@ pub enum Schedule {
         /// Between meridians, degrees.
         phi_step_deg: f64,
     },
+    /// Turns of the table while the arm rises from each to the next, readings taken in flight.
+    Spiral {
+        /// Columns of places on the sample.
+        x_count: u32,
+        /// Rows.
+        y_count: u32,
+        /// Between turns, degrees, at most.
+        theta_step_deg: f64,
+        /// Whether the turns are dealt out over the places, each flown at one of them alone; otherwise
+        /// all are flown at every place.
+        is_interleaved: bool,
+        /// Full width at half maximum of the narrowest feature that is looked for, degrees.
+        narrowest_feature_deg: f64,
+    },
     /// Sweeps of the arm along meridians, readings taken in flight.
     Sweep {
         /// Columns of places on the sample.

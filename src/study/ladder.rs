@@ -117,6 +117,9 @@ impl Rung {
                 narrowest_feature_deg: narrowest_feature_deg
                     .map(|width| finer_step(width * self.speed)),
             },
+            spiral @ Schedule::Spiral { .. } => {
+                turned(spiral, &finer_step, &|width| finer_step(width * self.speed))
+            }
             // An error so many times smaller, as if by noise alone.
             Schedule::Adaptive(adaptive) => Schedule::Adaptive(Adaptive {
                 radiance_relative: adaptive.radiance_relative.map(|error| error / finer),
@@ -173,6 +176,10 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
             );
             changes
         }
+        Schedule::Spiral { theta_step_deg, narrowest_feature_deg, .. } => vec![
+            set("theta_step_deg", theta_step_deg),
+            set("narrowest_feature_deg", narrowest_feature_deg),
+        ],
         Schedule::Adaptive(Adaptive {
             radiance_relative,
             exitance_relative,
@@ -188,6 +195,15 @@ pub(super) fn spacing(schedule: &Schedule) -> Vec<Change> {
         .collect(),
         Schedule::List { .. } => Vec::new(),
     }
+}
+
+/// A spiral with other turns, for features of another width.
+fn turned(mut spiral: Schedule, step: &dyn Fn(f64) -> f64, width: &dyn Fn(f64) -> f64) -> Schedule {
+    if let Schedule::Spiral { theta_step_deg, narrowest_feature_deg, .. } = &mut spiral {
+        *theta_step_deg = step(*theta_step_deg);
+        *narrowest_feature_deg = width(*narrowest_feature_deg);
+    }
+    spiral
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, and is positive

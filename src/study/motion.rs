@@ -40,7 +40,7 @@ impl Motion {
     pub fn of(schedule: &Schedule) -> Self {
         match schedule {
             Schedule::Adaptive(_) => Self::Adaptive,
-            Schedule::Sweep { .. } => Self::Sweep,
+            Schedule::Spiral { .. } | Schedule::Sweep { .. } => Self::Sweep,
             Schedule::CGamma { .. }
             | Schedule::List { .. }
             | Schedule::LowDiscrepancy { .. }
@@ -89,7 +89,10 @@ fn sweeps(plan: &Plan) -> Option<Vec<Change>> {
             let step = plan.fit.angular_degree.map_or(PHI_STEP_DEG, step);
             ((places, places), step, step)
         }
-        Schedule::Adaptive(_) | Schedule::List { .. } | Schedule::Sweep { .. } => return None,
+        Schedule::Adaptive(_)
+        | Schedule::List { .. }
+        | Schedule::Spiral { .. }
+        | Schedule::Sweep { .. } => return None,
     };
     // What the grid resolves where the plan doesn't say what there is to resolve.
     let declared = plan.expect.narrowest_feature_rad.map(f64::to_degrees);
