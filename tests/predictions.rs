@@ -5,7 +5,11 @@
 
 mod bench;
 
-use bench::Bench;
+use std::fs;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use bench::{Bench, Said, signal};
 use serde_json::Value;
 
 fn number(said: &Value, pointer: &str) -> f64 {
@@ -123,6 +127,41 @@ fn a_real_rig_is_rehearsed_on_its_simulated_twin() {
     // Without a scene there is nothing to rehearse before.
     bench.gonio(&words[..4]).refused(&["a simulated rig needs a scene", "--scene"]);
     bench.gonio(&["plan", "plan.toml", "--rehearse", "0"]).refused(&["--rehearse", "0"]);
+}
+
+/// Many runs, stopped while some of them are under way: the process ends at once, and where its journals
+/// were is nothing.
+#[test]
+fn many_runs_that_are_stopped_leave_nothing() {
+    let bench = expecting();
+    let temporary = bench.path("temporary");
+    fs::create_dir(&temporary).unwrap();
+    let before = bench.names();
+    let rehearsal = "plan plan.toml --rehearse 1000";
+    let frontier = "frontier plan.toml --seeds 1000 --out temporary/front";
+    for (line, name) in [(rehearsal, "INT"), (rehearsal, "TERM"), (frontier, "INT")] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let mut command = bench.command(&words);
+        command.env("TMPDIR", &temporary).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = command.spawn().unwrap();
+        let since = Instant::now();
+        let has_entries = |folder| fs::read_dir(folder).is_ok_and(|mut all| all.next().is_some());
+        // The folder of all runs is made before signals are heard, what is in it afterwards.
+        while !fs::read_dir(&temporary).unwrap().any(|made| has_entries(made.unwrap().path())) {
+            assert!(since.elapsed() < Duration::from_mins(2), "no run begins");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        signal(&child, name);
+        let sent = Instant::now();
+        let output = child.wait_with_output().unwrap();
+        assert!(sent.elapsed() < Duration::from_secs(5), "{:?}", sent.elapsed());
+        let said = Said::from_output(line, &output);
+        assert_eq!(said.code, Some(1), "{said}");
+        // Once, and not by every run that heard it.
+        assert!(said.err.starts_with("error: stopped: nothing"), "{said}");
+        assert_eq!(said.err.lines().count(), 1, "{said}");
+        assert_eq!(bench.names(), before);
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Runs a job on a rig in this process: an owner on a runtime of its own, in virtual time for a
-//! simulated rig that shall go as fast as it can. Hears Ctrl-C, and shows how far it is.
+//! simulated rig that shall go as fast as it can. Where it is alone it hears Ctrl-C and shows how far it is.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -28,6 +28,15 @@ pub(crate) enum Pace {
     Virtual,
     /// By the clock on the wall.
     Real,
+}
+
+/// Whether a job is all that the process does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Company {
+    /// It hears Ctrl-C and shows how far it is.
+    Alone,
+    /// Whoever began it with others does that for all of them.
+    AmongOthers,
 }
 
 /// What came of a job.
@@ -103,6 +112,7 @@ fn settings(port: &Port) -> SerialSettings {
 pub(crate) fn acquire(
     setup: &Setup,
     pace: Pace,
+    company: Company,
     begin: impl FnOnce() -> Result<(Journal, Job), Failure>,
 ) -> Result<Acquired, Failure> {
     pace.runtime()?.block_on(async {
@@ -110,7 +120,7 @@ pub(crate) fn acquire(
         let (owner, task) = own(Arc::new(setup.rig.clone()), opener, pace.session());
         owner.look().await.map_err(Failure::start)?;
         let (journal, job) = begin()?;
-        let ended = run_job(setup, &owner, pace, journal, job).await;
+        let ended = run_job(setup, &owner, (pace, company), journal, job).await;
         owner.shut_down().await;
         drop(owner);
         // The task has nothing to tell but its end.
@@ -127,14 +137,15 @@ pub(crate) fn acquire(
 async fn run_job(
     setup: &Setup,
     owner: &OwnerHandle,
-    pace: Pace,
+    (pace, company): (Pace, Company),
     journal: Journal,
     job: Job,
 ) -> Result<Ended, Failure> {
-    let mut stop =
-        StopSignals::new().map_err(|error| Failure::start(format!("signals: {error}")))?;
+    let is_alone = company == Company::Alone;
+    let stop = is_alone.then(StopSignals::new).transpose();
+    let mut stop = stop.map_err(|error| Failure::start(format!("signals: {error}")))?;
     let mut events = owner.subscribe();
-    let mut line = ProgressLine::new(setup, pace);
+    let mut line = ProgressLine::new(setup, pace, is_alone);
     let mut lines: Option<mpsc::Receiver<()>> = None;
     let writer = pace.writer(journal)?;
     let busy = |error: StartError| Failure::start(error);
@@ -144,7 +155,7 @@ async fn run_job(
     loop {
         tokio::select! {
             biased;
-            () = stop.next() => {
+            () = signalled(stop.as_mut()) => {
                 let wish = wishes.next().unwrap_or(Wish::Abort);
                 line.say(if wish == Wish::Stop {
                     "stopping after this dwell; once more stops at once"
@@ -173,6 +184,14 @@ async fn run_job(
                 Err(RecvError::Closed) => tokio::time::sleep(Duration::from_millis(1)).await,
             },
         }
+    }
+}
+
+/// The next signal; never one where another hears them.
+async fn signalled(stop: Option<&mut StopSignals>) {
+    match stop {
+        Some(stop) => stop.next().await,
+        None => std::future::pending().await,
     }
 }
 

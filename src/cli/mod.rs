@@ -47,6 +47,7 @@ mod summary;
 mod target;
 mod text;
 mod twins;
+mod virtual_run;
 mod wished;
 
 use std::process::ExitCode;

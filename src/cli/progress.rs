@@ -23,9 +23,9 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// A line for the setup's steps; it does nothing where nobody looks.
-    pub(crate) fn new(setup: &Setup, pace: Pace) -> Self {
-        let target = if std::io::stderr().is_terminal() {
+    /// A line for the setup's steps; where it is not to be shown, or nobody looks, it does nothing.
+    pub(crate) fn new(setup: &Setup, pace: Pace, is_shown: bool) -> Self {
+        let target = if is_shown && std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr_with_hz(10)
         } else {
             ProgressDrawTarget::hidden()

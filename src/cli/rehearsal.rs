@@ -5,17 +5,15 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::acquire::{Acquired, Pace, acquire};
 use super::failure::Failure;
-use super::folder::create;
+use super::halt::ends_when_stopped;
 use super::parallel::in_parallel;
 use super::results::{fit_region, optics};
-use super::run::first_job;
 use super::setup::Setup;
 use super::text::{duration, percent, table};
-use crate::journal::{InputRole, Order};
+use super::virtual_run::VirtualRun;
+use crate::journal::InputRole;
 use crate::rig::calibration::calibrate;
-use crate::run::OnFault;
 use crate::study::{Likely, Rehearsed, Stated};
 
 /// Several runs together.
@@ -29,6 +27,7 @@ pub(super) struct Rehearsal {
 /// Runs the plan so many times, each with the next seed; nothing of it is kept.
 pub(super) fn rehearse(setup: &Setup, runs: u64) -> Result<Rehearsal, Failure> {
     let work = Work::new()?;
+    ends_when_stopped(&work.0, "stopped: nothing of the rehearsal is kept".to_owned())?;
     let seeds: Vec<u64> = (0..runs).map(|k| setup.seed.wrapping_add(k)).collect();
     let one = |seed: &u64| one(setup, *seed, &work.0.join(seed.to_string()));
     let lost = || Err(Failure::midway("a rehearsed run: its thread panicked"));
@@ -47,16 +46,10 @@ pub(super) fn rehearse(setup: &Setup, runs: u64) -> Result<Rehearsal, Failure> {
 
 fn one(setup: &Setup, seed: u64, folder: &Path) -> Result<Rehearsed, Failure> {
     let setup = setup.with_plan(setup.plan.clone(), seed)?;
-    let acquired = acquire(&setup, Pace::Virtual, || {
-        let (journal, _) = create(folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
-    })?;
-    let Acquired { rig_s, journal, .. } = acquired;
-    let journal = journal.map_err(Failure::midway)?;
-    let readings = journal.reader().readings(Order::Taken)?;
-    journal.close().map_err(Failure::midway)?;
-    let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
-    let (region, optics) = (fit_region(&setup), optics(&setup));
+    let run = VirtualRun::passing(setup, folder)?;
+    let VirtualRun { setup, readings, rig_s } = &run;
+    let calibrated = calibrate(&setup.rig, readings).map_err(Failure::midway)?;
+    let (region, optics) = (fit_region(setup), optics(setup));
     let fitted = calibrated
         .fit(&region, &setup.plan.fit, optics.as_ref())
         .map_err(|error| Failure::midway(format!("a rehearsed run's fit: {error}")))?;
@@ -66,8 +59,7 @@ fn one(setup: &Setup, seed: u64, folder: &Path) -> Result<Rehearsed, Failure> {
         exitance_within_region: truth.exitance_within_region(),
         radiance: &|ray| truth.radiance(ray.x_m, ray.y_m, ray.theta_rad, ray.phi_rad),
     };
-    let first_s = readings.iter().map(|reading| reading.time_s).fold(f64::INFINITY, f64::min);
-    Rehearsed::of(&fitted.fit, likely, rig_s - first_s).ok_or_else(dark)
+    Rehearsed::of(&fitted.fit, likely, rig_s - run.first_s()).ok_or_else(dark)
 }
 
 fn dark() -> Failure {

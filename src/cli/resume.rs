@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::acquire::{Acquired, Pace, acquire};
+use super::acquire::{Acquired, Company, Pace, acquire};
 use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{JOURNAL, effects};
@@ -24,7 +24,7 @@ pub(crate) fn resume(args: &ResumeArgs) -> Outcome {
     let pace = Pace::of(&setup, args.realtime);
     let job = job(&setup, &journal, &left, args.accept_drift, (OnFault::Finish, pace))?;
     let acquired = match job {
-        Some(job) => acquire(&setup, pace, || Ok((Journal::open(&journal)?, job)))?,
+        Some(job) => acquire(&setup, pace, Company::Alone, || Ok((Journal::open(&journal)?, job)))?,
         None => nothing_left(&args.dir, Journal::open(&journal)?, &left),
     };
     let ending = Ending { is_strict: args.strict, is_json: args.json };

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use super::acquire::{Acquired, Pace, acquire, exit_code};
+use super::acquire::{Acquired, Company, Pace, acquire, exit_code};
 use super::adapting;
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
         note(&warning);
     }
     let pace = Pace::of(&setup, args.realtime);
-    let acquired = acquire(&setup, pace, || {
+    let acquired = acquire(&setup, pace, Company::Alone, || {
         let (journal, _) = create(&folder, &setup)?;
         Ok((journal, first_job(&setup, OnFault::Finish, pace)?))
     })?;
@@ -122,11 +122,15 @@ pub(crate) fn finish(
 }
 
 fn interrupted(folder: &Path, outcome: &run::Outcome) -> Failure {
-    let why = match outcome {
+    Failure::midway(format!("{}\n  help: {}", why_not_whole(outcome), resume_line(folder)))
+}
+
+/// Why a run did not come to its end.
+pub(crate) fn why_not_whole(outcome: &run::Outcome) -> String {
+    match outcome {
         run::Outcome::Faulted(fault) => format!("the run stopped: {fault}"),
         other => format!("the run is not complete: {}", other.name()),
-    };
-    Failure::midway(format!("{why}\n  help: {}", resume_line(folder)))
+    }
 }
 
 /// What carries the run on.

@@ -7,21 +7,18 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use self::rungs::{Entry, entries};
-use super::acquire::{Acquired, Pace, acquire};
 use super::args::FrontierArgs;
 use super::failure::{Failure, Outcome};
-use super::folder::create;
+use super::halt::ends_when_stopped;
 use super::output::{say, write_out};
 use super::parallel::in_parallel;
 use super::results::Results;
-use super::run::first_job;
 use super::session::utc_stamp;
 use super::setup::Setup;
 use super::text::{duration, percent};
+use super::virtual_run::VirtualRun;
 use crate::export::{ExportError, write_atomically, write_frontier};
-use crate::journal::Order;
 use crate::report::frontier_pictures;
-use crate::run::OnFault;
 use crate::study::{Foretold, FrontierPoint, FrontierRow, points};
 
 mod compute;
@@ -47,6 +44,7 @@ pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
     }
     std::fs::create_dir_all(&folder)
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
+    ends_when_stopped(&folder, "stopped: nothing of the frontier is kept".to_owned())?;
     if let Some((setup, entries)) = &asked {
         in_rig_time(args, setup, entries, &folder)?;
     }
@@ -140,16 +138,8 @@ fn run_one(entry: &Entry, folder: &Path, k: u64) -> Result<FrontierRow, Failure>
     let began = Instant::now();
     let seed = entry.setup.seed.wrapping_add(k);
     let setup = entry.setup.with_plan(entry.setup.plan.clone(), seed)?;
-    let acquired = acquire(&setup, Pace::Virtual, || {
-        let (journal, _) = create(folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
-    })?;
-    let Acquired { rig_s, journal, .. } = acquired;
-    let journal = journal.map_err(Failure::midway)?;
-    let readings = journal.reader().readings(Order::Taken)?;
+    let VirtualRun { setup, readings, rig_s } = VirtualRun::kept(setup, folder)?;
     let results = Results::of(&setup, setup.plan.fit, &readings)?;
-    let setup = setup.with_rounds(journal.reader())?;
-    journal.close().map_err(Failure::midway)?;
     row(entry, &setup, &results, rig_s, readings.len(), began)
 }
 

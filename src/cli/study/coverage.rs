@@ -8,23 +8,19 @@ use std::process::ExitCode;
 use radiometry::quadrature::gauss_legendre;
 
 use super::document::{Document, section, summary};
-use super::kept::{Scores, nothing_left, stopped};
-use crate::cli::acquire::{Acquired, Pace, acquire};
+use super::kept::{Scores, stopped};
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
-use crate::cli::folder::create;
 use crate::cli::halt::ends_when_stopped;
 use crate::cli::output::{note, say, write_out};
 use crate::cli::parallel::in_parallel;
 use crate::cli::results::{fit_of, fit_region};
-use crate::cli::run::first_job;
 use crate::cli::session::utc_stamp;
 use crate::cli::setup::Setup;
+use crate::cli::virtual_run::{Texts, VirtualRun};
 use crate::export::{write_atomically, write_coverage};
-use crate::journal::{EffectWishes, Input, InputRole, Order};
 use crate::report::{Cells, scores_svg};
 use crate::rig::Rig;
-use crate::run::OnFault;
 use crate::study::coverage::{
     Answer, Cell, Drawn, Draws, FAMILIES, Family, Kind, Lamp, Pool, Run, Scale, Score, Target,
     binomial_band, demands, tally, targets,
@@ -93,7 +89,7 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
         std::fs::create_dir_all(made)
             .map_err(|error| Failure::start(format!("{}: {error}", made.display())))?;
     }
-    ends_when_stopped(nothing_left(&folder), stopped(args.cache.as_deref()))?;
+    ends_when_stopped(&folder, stopped(args.cache.as_deref()))?;
     let studied = study(families, runs, args, &work)?;
     // Ours, and empty but for runs that were refused.
     let _ = std::fs::remove_dir_all(&work);
@@ -229,32 +225,12 @@ fn run_one(
     folder: &Path,
     kept: &Scores<'_>,
 ) -> Result<(Vec<Target>, Run), Failure> {
-    let input = |role, name: &str, bytes: &[u8]| Input {
-        role,
-        name: name.to_owned(),
-        bytes: bytes.to_vec(),
-    };
-    let mut inputs = vec![
-        input(InputRole::Plan, "plan.toml", drawn.plan.as_bytes()),
-        input(InputRole::Rig, "rig.toml", drawn.rig.as_bytes()),
-        input(InputRole::Scene, "scene.toml", drawn.scene.as_bytes()),
-    ];
-    let attached = drawn.attachments.iter();
-    inputs.extend(attached.map(|a| input(InputRole::Attachment, &a.name, &a.bytes)));
-    let setup = Setup::from_inputs(inputs, None, seed, EffectWishes::default())?;
+    let Drawn { plan, rig, scene, attachments } = drawn;
+    let setup = Texts { plan, rig, scene, attachments }.setup(seed)?;
     if let Some(run) = kept.find(drawn, seed) {
         return Ok((targets(&fit_region(&setup)), run));
     }
-    let acquired = acquire(&setup, Pace::Virtual, || {
-        let (journal, _) = create(folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
-    })?;
-    let Acquired { journal, .. } = acquired;
-    let journal = journal.map_err(Failure::midway)?;
-    let readings = journal.reader().readings(Order::Taken)?;
-    journal.close().map_err(Failure::midway)?;
-    // Thousands of journals would fill a disk.
-    let _ = std::fs::remove_dir_all(folder);
+    let VirtualRun { setup, readings, .. } = VirtualRun::passing(setup, folder)?;
     let (targets, run) = scored(&setup, &fit_of(&setup, &readings)?)?;
     kept.keep(drawn, seed, &run)?;
     Ok((targets, run))

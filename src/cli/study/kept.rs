@@ -1,5 +1,5 @@
-//! What a study keeps of its runs, and what it leaves when it is stopped: with a cache the same command
-//! goes on where it was. It does not know what a run of the study of cost is.
+//! What a study keeps of its runs: with a cache the same command goes on where it was stopped. It does not
+//! know what a run of the study of cost is.
 
 use std::path::{Path, PathBuf};
 
@@ -69,20 +69,6 @@ impl<'a> Scores<'a> {
     }
 }
 
-/// Takes away what a study that is stopped leaves in its folder, which was made for it: the same command
-/// shall find it as it was.
-pub(super) fn nothing_left(folder: &Path) -> impl FnOnce() + Send + use<> {
-    let folder = folder.to_owned();
-    move || {
-        // Runs under way may put something there meanwhile.
-        for _ in 0..TRIES {
-            if std::fs::remove_dir_all(&folder).is_ok() || !folder.exists() {
-                break;
-            }
-        }
-    }
-}
-
 /// What a study says that is stopped.
 pub(super) fn stopped(cache: Option<&Path>) -> String {
     match cache {
@@ -94,9 +80,6 @@ pub(super) fn stopped(cache: Option<&Path>) -> String {
             .to_owned(),
     }
 }
-
-/// A folder that something is put into is taken away so many times.
-const TRIES: u32 = 10;
 
 #[cfg(test)]
 mod tests {

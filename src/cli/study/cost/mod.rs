@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use self::one::Bench;
 use super::document::Document;
-use super::kept::{nothing_left, program, stopped};
+use super::kept::{program, stopped};
 use crate::cli::args::CostArgs;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::halt::ends_when_stopped;
@@ -67,7 +67,7 @@ pub(crate) fn cost(args: &CostArgs) -> Outcome {
         std::fs::create_dir_all(made)
             .map_err(|error| Failure::start(format!("{}: {error}", made.display())))?;
     }
-    ends_when_stopped(nothing_left(&folder), stopped(args.cache.as_deref()))?;
+    ends_when_stopped(&folder, stopped(args.cache.as_deref()))?;
     let found = study(asked, &work, args.cache.as_deref())?;
     // Ours, and empty but for runs that were refused.
     let _ = std::fs::remove_dir_all(&work);

@@ -7,18 +7,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::cache::{Cache, Key};
-use crate::cli::acquire::{Acquired, Pace, acquire};
 use crate::cli::failure::Failure;
-use crate::cli::folder::create;
 use crate::cli::results::{fit_region, optics};
-use crate::cli::run::first_job;
 use crate::cli::setup::Setup;
 use crate::cli::study::coverage::PHOTOMETRIC;
-use crate::journal::{EffectWishes, Input, InputRole, Order};
+use crate::cli::virtual_run::{Texts, VirtualRun};
 use crate::plan::Plan;
 use crate::rig::calibration::{Calibrated, calibrate};
 use crate::rig::{Pose, Reading, Rig};
-use crate::run::OnFault;
 use crate::study::Motion;
 use crate::study::cost::{Run, Rung, Scene, SceneFiles, Strategy, interpolate};
 use crate::study::{Nodes, Score};
@@ -118,32 +114,11 @@ impl<'a> Bench<'a> {
 
     fn acquire(&self, plan: &str, seed: u64, strategy: Strategy) -> Result<Acquisition, Failure> {
         let began = Instant::now();
-        let input = |role, name: &str, bytes: &[u8]| Input {
-            role,
-            name: name.to_owned(),
-            bytes: bytes.to_vec(),
-        };
-        let mut inputs = vec![
-            input(InputRole::Plan, "plan.toml", plan.as_bytes()),
-            input(InputRole::Rig, "rig.toml", self.rig.as_bytes()),
-            input(InputRole::Scene, "scene.toml", self.files.text.as_bytes()),
-        ];
-        let attached = self.files.attachments.iter();
-        inputs.extend(attached.map(|a| input(InputRole::Attachment, &a.name, &a.bytes)));
-        let setup = Setup::from_inputs(inputs, None, seed, EffectWishes::default())?;
+        let SceneFiles { text: scene, attachments } = &self.files;
+        let setup = Texts { plan, rig: self.rig, scene, attachments }.setup(seed)?;
         // A scene is climbed by one thread for each motion.
         let folder = self.work.join(format!("{}-{}", self.scene.name(), strategy.name()));
-        let acquired = acquire(&setup, Pace::Virtual, || {
-            let (journal, _) = create(&folder, &setup)?;
-            Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
-        })?;
-        let Acquired { journal, .. } = acquired;
-        let journal = journal.map_err(Failure::midway)?;
-        let readings = journal.reader().readings(Order::Taken)?;
-        let mut setup = setup.with_rounds(journal.reader())?;
-        journal.close().map_err(Failure::midway)?;
-        // Thousands of journals would fill a disk.
-        let _ = std::fs::remove_dir_all(&folder);
+        let VirtualRun { mut setup, readings, .. } = VirtualRun::passing(setup, &folder)?;
         if strategy.motion() == Motion::Adaptive {
             // Its time may have broken a round off: what it would have measured costs nothing.
             let taken: BTreeSet<u32> = readings.iter().map(|reading| reading.id).collect();
