@@ -102,4 +102,8 @@ fn what_makes_no_sense_is_refused_before_anything_is_run() {
     study(&["--doc", "cost.md"]).refused(&["--doc", "--date"]);
     study(&["--longest", "0"]).refused(&["above 0"]);
     assert_eq!(bench.names(), Vec::<String>::new());
+    // A file is where the cache should be: nothing is made for a study that can't keep its runs.
+    fs::write(bench.path("kept"), "").unwrap();
+    study(&["--short", "--cache", "kept", "--out", "found"]).refused(&["--cache kept", "choose"]);
+    assert_eq!(bench.names(), ["kept"]);
 }

@@ -69,6 +69,10 @@ fn what_makes_no_sense_is_refused_before_anything_is_run() {
     study(&["--doc", "measured.md", "--short"]).refused(&["--doc", "--date"]);
     study(&["--runs", "1"]).refused(&["from 2 to 1000000"]);
     assert_eq!(bench.names(), Vec::<String>::new());
+    // A file is where the cache should be: nothing is made for a study that can't keep its runs.
+    std::fs::write(bench.path("kept"), "").unwrap();
+    study(&["--short", "--cache", "kept", "--out", "found"]).refused(&["--cache kept", "choose"]);
+    assert_eq!(bench.names(), ["kept"]);
 }
 
 /// Radiances along a few rays of a run by this seed, with the part of u that all readings share.

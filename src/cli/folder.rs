@@ -67,6 +67,17 @@ pub(crate) fn exists_already(folder: &Path) -> Failure {
     )
 }
 
+/// Refuses a folder that is there already, for what is no run.
+pub(crate) fn refuse_existing(folder: &Path) -> Result<(), Failure> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    Err(Failure::with_help(
+        format!("{}: exists already; nothing is overwritten", folder.display()),
+        "choose another folder with --out",
+    ))
+}
+
 fn no_folder(folder: &Path, error: &std::io::Error) -> Failure {
     Failure::with_help(
         format!("{}: the folder cannot be made: {error}", folder.display()),

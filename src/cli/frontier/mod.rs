@@ -9,6 +9,7 @@ use std::time::Instant;
 use self::rungs::{Entry, entries};
 use super::args::FrontierArgs;
 use super::failure::{Failure, Outcome};
+use super::folder::refuse_existing;
 use super::halt::ends_when_stopped;
 use super::output::{say, write_out};
 use super::parallel::in_parallel;
@@ -36,12 +37,7 @@ pub(crate) fn frontier(args: &FrontierArgs) -> Outcome {
     let name = asked.as_ref().map_or("compute", |(setup, _)| &setup.plan_name);
     let folder =
         args.out.clone().unwrap_or_else(|| format!("frontier-{name}-{}", utc_stamp()).into());
-    if folder.exists() {
-        return Err(Failure::with_help(
-            format!("{}: exists already; nothing is overwritten", folder.display()),
-            "choose another folder with --out",
-        ));
-    }
+    refuse_existing(&folder)?;
     std::fs::create_dir_all(&folder)
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
     ends_when_stopped(&folder, "stopped: nothing of the frontier is kept".to_owned())?;

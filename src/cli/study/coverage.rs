@@ -2,20 +2,19 @@
 //! the wire, the journal, the calibration and the fit that `gonio run` has; how often the stated
 //! intervals hold the truth.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use radiometry::quadrature::gauss_legendre;
 
 use super::document::{Document, section, summary};
-use super::kept::{Scores, stopped};
+use super::kept::Scores;
+use super::place::Place;
 use crate::cli::args::CoverageArgs;
 use crate::cli::failure::{Failure, Outcome};
-use crate::cli::halt::ends_when_stopped;
 use crate::cli::output::{note, say, write_out};
 use crate::cli::parallel::in_parallel;
 use crate::cli::results::{fit_of, fit_region};
-use crate::cli::session::utc_stamp;
 use crate::cli::setup::Setup;
 use crate::cli::virtual_run::{Texts, VirtualRun};
 use crate::export::{write_atomically, write_coverage};
@@ -76,28 +75,16 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
     let document = Document::asked(&args.document, NAMES[usize::from(args.unpinned)])?;
     let families = families(args)?;
     let runs = args.runs.unwrap_or(if args.short { SHORT_RUNS } else { 1000 });
-    let folder =
-        args.out.clone().unwrap_or_else(|| PathBuf::from(format!("coverage-{}", utc_stamp())));
-    if folder.exists() {
-        return Err(Failure::with_help(
-            format!("{}: exists already; nothing is overwritten", folder.display()),
-            "choose another folder with --out",
-        ));
-    }
-    let work = folder.join("runs");
-    for made in [Some(&work), args.cache.as_ref()].into_iter().flatten() {
-        std::fs::create_dir_all(made)
-            .map_err(|error| Failure::start(format!("{}: {error}", made.display())))?;
-    }
-    ends_when_stopped(&folder, stopped(args.cache.as_deref()))?;
-    let studied = study(families, runs, args, &work)?;
-    // Ours, and empty but for runs that were refused.
-    let _ = std::fs::remove_dir_all(&work);
+    let place = Place::make("coverage", args.out.as_deref(), args.cache.as_deref())?;
+    let studied = study(families, runs, args, &place.runs)?;
+    place.clear();
     let demands = demands(&studied.cells, &studied.pools);
     let svg = picture(&studied);
-    write_atomically(&folder.join("coverage.csv"), |out| write_coverage(out, &studied.cells))
+    write_atomically(&place.folder.join("coverage.csv"), |out| write_coverage(out, &studied.cells))
         .and_then(|()| {
-            write_atomically(&folder.join("coverage.svg"), |out| out.write_all(svg.as_bytes()))
+            write_atomically(&place.folder.join("coverage.svg"), |out| {
+                out.write_all(svg.as_bytes())
+            })
         })
         .map_err(Failure::midway)?;
     if let Some(document) = document {
@@ -109,7 +96,7 @@ pub(crate) fn coverage(args: &CoverageArgs) -> Outcome {
     if args.json {
         write_out(|out| super::document::write_json(out, &studied, &demands))?;
     } else {
-        let shown = folder.display();
+        let shown = place.folder.display();
         say(&format!("{}  folder {shown}\n", summary(&studied, &demands)))?;
     }
     let is_met = demands.iter().all(|demand| demand.is_met) && studied.refused.is_empty();

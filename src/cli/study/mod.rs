@@ -4,6 +4,7 @@ mod cost;
 mod coverage;
 mod document;
 mod kept;
+mod place;
 
 pub(crate) use cost::cost;
 pub(crate) use coverage::coverage;

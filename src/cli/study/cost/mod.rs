@@ -1,18 +1,17 @@
 //! `gonio study cost`: what accuracy costs in rig time, strategy against strategy. Climbs ladders of
 //! plans on the simulated rig, scene by scene, until the targets are met.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use self::one::Bench;
 use super::document::Document;
-use super::kept::{program, stopped};
+use super::kept::program;
+use super::place::Place;
 use crate::cli::args::CostArgs;
 use crate::cli::failure::{Failure, Outcome};
-use crate::cli::halt::ends_when_stopped;
 use crate::cli::output::{note, say, say_json};
 use crate::cli::parallel::in_parallel;
-use crate::cli::session::utc_stamp;
 use crate::export::{ExportError, write_atomically, write_cost, write_reached};
 use crate::rig::Rig;
 use crate::study::Motion;
@@ -55,31 +54,19 @@ pub(super) struct Found {
 pub(crate) fn cost(args: &CostArgs) -> Outcome {
     let document = Document::asked(&args.document, NAME)?;
     let asked = Asked::of(args)?;
-    let folder = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("cost-{}", utc_stamp())));
-    if folder.exists() {
-        return Err(Failure::with_help(
-            format!("{}: exists already; nothing is overwritten", folder.display()),
-            "choose another folder with --out",
-        ));
-    }
-    let work = folder.join("runs");
-    for made in [Some(&work), args.cache.as_ref()].into_iter().flatten() {
-        std::fs::create_dir_all(made)
-            .map_err(|error| Failure::start(format!("{}: {error}", made.display())))?;
-    }
-    ends_when_stopped(&folder, stopped(args.cache.as_deref()))?;
-    let found = study(asked, &work, args.cache.as_deref())?;
-    // Ours, and empty but for runs that were refused.
-    let _ = std::fs::remove_dir_all(&work);
+    let cache = args.cache.as_deref();
+    let place = Place::make("cost", args.out.as_deref(), cache)?;
+    let found = study(asked, &place.runs, cache)?;
+    place.clear();
     let svg = words::picture(&found);
-    write(&folder, &found, &svg).map_err(Failure::midway)?;
+    write(&place.folder, &found, &svg).map_err(Failure::midway)?;
     if let Some(document) = document {
         document.write(&words::section(&found, &document), &svg)?;
     }
     if args.json {
         say_json(&words::as_json(&found))?;
     } else {
-        say(&format!("{}  folder {}\n", words::summary(&found), folder.display()))?;
+        say(&format!("{}  folder {}\n", words::summary(&found), place.folder.display()))?;
     }
     let is_met = found.aims.iter().all(|aim| aim.is_met != Some(false));
     Ok(if is_met { ExitCode::SUCCESS } else { ExitCode::from(1) })
