@@ -164,6 +164,47 @@ fn many_runs_that_are_stopped_leave_nothing() {
     }
 }
 
+/// What the readings are to choose is foretold with something in its place.
+#[test]
+fn a_stand_in_says_what_it_stands_in_for() {
+    let pinned = "angular_degree = 2\nposition_degree = 1";
+    let splines = "basis = \"splines\"\ntheta_spans = 3\nphi_spans = 4\nposition_degree = 0";
+    let power = "angular_degree = 2\nposition_degree = 1\npenalty_power = 2";
+    for (fit, is_pinned, words) in [
+        (pinned, true, "18 coefficients, all determined"),
+        (
+            "angular_degree = 2",
+            false,
+            "chosen from the readings; here stand in zernike functions of degree 2, of degree 1 in position",
+        ),
+        (
+            splines,
+            true,
+            "splines of 3 x 4 spans, of degree 0 in position, their penalty chosen from the readings; here \
+             stand in zernike functions of degree N, of degree 0 in position, without one",
+        ),
+        (
+            power,
+            true,
+            "zernike functions of degree 2, of degree 1 in position, their penalty chosen from the \
+             readings; here without one",
+        ),
+    ] {
+        let bench = expecting().with("plan.toml", pinned, fit);
+        let said = bench.gonio(&["plan", "plan.toml"]).well();
+        let json = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+        let json = &json["fit"];
+        let degree = json["assumed_degree"].as_u64();
+        let words = words.replace('N', &degree.unwrap_or(0).to_string());
+        assert!(said.out.contains(&words), "{words}\n{said}");
+        assert_eq!(json["pinned"].is_string(), is_pinned, "{json}");
+        assert_eq!(
+            (json["stands_in"].is_string(), degree.is_some()),
+            (fit != pinned, fit != pinned)
+        );
+    }
+}
+
 #[test]
 fn an_assumed_level_says_so() {
     let bench = Bench::small();

@@ -1,6 +1,7 @@
 //! What a plan is going to know on its rig, asked before anything moves: see
 //! [`crate::study::Forecast`]. Here are the words.
 
+use fit::{Angular, BasisSpec, Position};
 use serde_json::{Value, json};
 
 use super::setup::Setup;
@@ -107,6 +108,21 @@ fn not_foretold(forecast: &Forecast, within: &str) -> String {
         said.push_str(". --rehearse shows it\n");
     }
     said
+}
+
+/// A basis in words.
+pub(crate) fn basis(BasisSpec { angular, position }: BasisSpec) -> String {
+    let name = angular.name();
+    let direction = match (angular, angular.degree()) {
+        (Angular::Splines { theta_spans, phi_spans, .. }, _) => {
+            format!("{name} of {theta_spans} x {phi_spans} spans")
+        }
+        (_, degree) => format!("{name} functions of degree {}", degree.unwrap_or(0)),
+    };
+    match position {
+        Position::Legendre { degree } => format!("{direction}, of degree {degree} in position"),
+        Position::Splines { spans } => format!("{direction}, of {spans} spans in position"),
+    }
 }
 
 /// The same for programs.

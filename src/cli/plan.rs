@@ -81,14 +81,7 @@ fn as_text(
     rows.extend(order(setup));
     rows.extend(decided_on_the_way(setup));
     if let Ok(forecast) = outlook {
-        let (count, condition) = (forecast.coefficients, forecast.condition);
-        rows.push(row(
-            "fit",
-            match forecast.assumed_degree {
-                None => format!("{count} coefficients, all determined (condition {condition:.1})"),
-                Some(degree) => format!("chosen from the readings; here of degree {degree}"),
-            },
-        ));
+        rows.push(row("fit", fit(setup, forecast)));
     }
     let mut text = table(&rows);
     match outlook {
@@ -102,6 +95,28 @@ fn as_text(
         }
     }
     text
+}
+
+/// The fit that is foretold, and where the plan leaves something to the readings what that is.
+fn fit(setup: &Setup, forecast: &Forecast) -> String {
+    let Some(stands_in) = forecast.stands_in else {
+        let (count, condition) = (forecast.coefficients, forecast.condition);
+        return format!("{count} coefficients, all determined (condition {condition:.1})");
+    };
+    match setup.plan.fit.basis() {
+        None => {
+            format!("chosen from the readings; here stand in {}", outlook::basis(stands_in))
+        }
+        Some(pinned) if pinned == stands_in => format!(
+            "{}, their penalty chosen from the readings; here without one",
+            outlook::basis(pinned)
+        ),
+        Some(pinned) => format!(
+            "{}, their penalty chosen from the readings; here stand in {}, without one",
+            outlook::basis(pinned),
+            outlook::basis(stands_in)
+        ),
+    }
 }
 
 /// How good the order of the targets is.
@@ -182,7 +197,10 @@ fn as_json(
     let fit = match outlook {
         Ok(forecast) => json!({
             "determined": true, "coefficients": forecast.coefficients,
-            "condition": forecast.condition, "assumed_degree": forecast.assumed_degree,
+            "condition": forecast.condition,
+            "pinned": setup.plan.fit.basis().map(outlook::basis),
+            "stands_in": forecast.stands_in.map(outlook::basis),
+            "assumed_degree": forecast.stands_in.and_then(|basis| basis.angular.degree()),
         }),
         Err(ForecastError::Fit(error)) => json!({"determined": false, "why": error.to_string()}),
         Err(_) => serde_json::Value::Null,

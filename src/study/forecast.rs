@@ -28,8 +28,8 @@ pub struct Forecast {
     pub prior: Prior,
     /// Coefficients of the fit.
     pub coefficients: usize,
-    /// The degree in direction, where the plan leaves it to the readings.
-    pub assumed_degree: Option<usize>,
+    /// What stands in for what the plan leaves to the readings: a basis, without a penalty.
+    pub stands_in: Option<BasisSpec>,
     /// Condition of the fit.
     pub condition: f64,
     /// The exitance that is expected.
@@ -94,9 +94,9 @@ impl Forecast {
         for degree in DEGREES_ASSUMED {
             let angular = plan.fit.angular_degree.unwrap_or(degree);
             let position = plan.fit.position_degree.unwrap_or(POSITION_ASSUMED);
-            let model = BasisSpec::zernike(angular, position).into();
-            match Self::in_model(plan, rig, sequence, model) {
-                Ok(forecast) => return Ok(Self { assumed_degree: Some(angular), ..forecast }),
+            let basis = BasisSpec::zernike(angular, position);
+            match Self::in_model(plan, rig, sequence, basis.into()) {
+                Ok(forecast) => return Ok(Self { stands_in: Some(basis), ..forecast }),
                 Err(error) => last = Some(error),
             }
         }
@@ -167,7 +167,7 @@ impl Forecast {
         Ok(Self {
             prior,
             coefficients,
-            assumed_degree: None,
+            stands_in: None,
             condition: fit.condition(),
             exitance: fit.exitance().value,
             flux: fit.flux().value,

@@ -132,7 +132,7 @@ impl Wish {
     /// How many splines are pinned, where they are too many for a choice to go through strengths of
     /// their penalty and none is named.
     pub(super) fn splines_of_open_strength(&self) -> Option<usize> {
-        let basis = BasisSpec { angular: self.angular()?, position: self.position()? };
+        let basis = self.basis()?;
         (self.penalty().is_none() && sparse::is_called_for(basis)).then(|| basis.len())
     }
 
@@ -140,8 +140,12 @@ impl Wish {
     /// in direction gets plain least squares unless a penalty is named too; of splines, which few
     /// readings determine by themselves, the penalty is chosen unless it is named.
     pub fn decided(&self) -> Option<Penalised> {
-        let (angular, position) = (self.angular()?, self.position()?);
-        Some(Penalised::new(BasisSpec { angular, position }, self.penalty()?))
+        Some(Penalised::new(self.basis()?, self.penalty()?))
+    }
+
+    /// The basis, if all of it is pinned; its penalty may be open.
+    pub fn basis(&self) -> Option<BasisSpec> {
+        Some(BasisSpec { angular: self.angular()?, position: self.position()? })
     }
 
     /// The functions of the direction, if they are pinned.
