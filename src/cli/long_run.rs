@@ -213,5 +213,6 @@ fn each_block<E: From<Failure>>(
     }
 }
 
-/// Enough for what a block costs beside its rows, few enough for a hundred components' effects on each.
-const BLOCK_READINGS: u32 = 128;
+/// Enough for what a block costs beside its rows, few enough for a hundred components' effects on each: a
+/// megabyte.
+const BLOCK_READINGS: u32 = 1024;
