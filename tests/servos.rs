@@ -28,6 +28,18 @@ impl Samples {
     }
 }
 
+/// After homing the run took what its plan says: servos are asked whether they stand, and one of them swings
+/// the shutter.
+fn foretold(bench: &Bench) {
+    let plan = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
+    let time = |part: &str| plan["time_s"][part].as_f64().unwrap();
+    let readings = samples(bench, "run/readings.csv");
+    let first_s = readings.column("time_s").into_iter().fold(f64::INFINITY, f64::min);
+    let ends_us = readings.column("end_us").into_iter().fold(0.0, f64::max);
+    let (foretold_s, took_s) = (time("total") - time("homing"), ends_us / 1e6 - first_s);
+    assert!((took_s / foretold_s - 1.0).abs() < 0.01, "{took_s} s, {foretold_s} s foretold");
+}
+
 /// The example's plan, small: one spot, and steps of 40 and 60 degrees.
 fn small() -> Bench {
     Bench::of("servo-arm")
@@ -50,6 +62,7 @@ fn the_plan_reads_the_same_through_servos_and_a_meter() {
     let (_, simulated) = after.split_once("[simulated]").unwrap();
     let own = own.having("rig.toml", format!("{before}[simulated]{simulated}"));
     own.gonio(&["run", "plan.toml", "--out", "run"]).well();
+    foretold(&servos);
     let [a, b] = [&servos, &own].map(|bench| samples(bench, "run/samples.csv"));
     assert!(a.rows.len() == b.rows.len() && a.rows.len() > 100);
     let radiance = "radiance_w_per_m2_sr";

@@ -1,7 +1,7 @@
 //! What a sequence will cost in rig time, from the same profile of motion that the device runs.
 //!
 //! Commands cost nothing here: they queue on the device, behind its motion, or are short. What a
-//! meter says of many readings at once is not short.
+//! meter says of many readings at once is not short, and servos say nothing unless they are asked.
 
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ pub struct Prediction {
     pub dwelling_s: f64,
     /// Integrating dark and reference readings.
     pub checking_s: f64,
-    /// Waiting for the meter's words, of all readings.
+    /// Waiting for the meter's words and for servos' answers, of all readings.
     pub overhead_s: f64,
 }
 
@@ -45,7 +45,8 @@ pub struct StepTime {
     pub settling_s: f64,
     /// Integrating.
     pub dwelling_s: f64,
-    /// Waiting for the meter's words: see [`Rig::answer_s`].
+    /// Waiting for the meter's words and for servos' answers: see [`Rig::answer_s`], [`Rig::arrival_s`] and
+    /// [`Rig::shutter_s`].
     pub overhead_s: f64,
 }
 
@@ -68,7 +69,7 @@ impl StepTime {
             moving_s: moving_s.as_secs_f64(),
             settling_s: route.settle.as_secs_f64(),
             dwelling_s: f64::from(readings) / f64::from(adc.rate_hz),
-            overhead_s: rig.answer_s(readings),
+            overhead_s: rig.answer_s(readings) + waiting_s(rig, step.kind),
         }
     }
 
@@ -100,6 +101,12 @@ impl StepTime {
     pub fn total_s(&self) -> f64 {
         self.moving_s + self.settling_s + self.dwelling_s + self.overhead_s
     }
+}
+
+/// Until axes are known to stand, and a servo to have closed the shutter and opened it again.
+fn waiting_s(rig: &Rig, kind: ReadingKind) -> f64 {
+    let shutter_s = if kind == ReadingKind::Dark { 2.0 * rig.shutter_s() } else { 0.0 };
+    rig.arrival_s() + shutter_s
 }
 
 impl Prediction {

@@ -102,22 +102,6 @@ pub struct PhotometerLink {
     pub baud: u32,
 }
 
-impl PhotometerLink {
-    /// The bytes of an answer with so many readings: of a picoammeter, which tells every one of them
-    /// with its time; of the others, which tell one mean, next to none.
-    pub fn answer_bytes(&self, readings: u32) -> u64 {
-        match self.driver {
-            PhotometerDriver::Keithley(_) => u64::from(readings) * KEITHLEY_READING_BYTES,
-            _ => 0,
-        }
-    }
-}
-
-/// `+1.234567E-09A,+1.234567E+03,` of each reading: value and time.
-const KEITHLEY_READING_BYTES: u64 = 29;
-/// On a serial line, with start and stop.
-const BITS_A_BYTE: u64 = 10;
-
 /// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Port {
@@ -165,18 +149,6 @@ impl Devices {
     pub fn ports(&self) -> impl Iterator<Item = &Port> {
         let axes = self.axes.iter().map(|link| link.port.as_ref());
         axes.chain([self.photometer.port.as_ref()]).flatten()
-    }
-
-    /// How long the meter takes to tell so many readings, seconds: its answer's way over a serial
-    /// line, which a network or USB has no match for.
-    pub fn answer_s(&self, readings: u32) -> f64 {
-        let is_elsewhere =
-            |port: &Port| ["tcp:", "/dev/usbtmc"].iter().any(|kind| port.path.starts_with(kind));
-        if self.photometer.port.as_ref().is_some_and(is_elsewhere) {
-            return 0.0;
-        }
-        let bits = BITS_A_BYTE * self.photometer.answer_bytes(readings);
-        bits as f64 / f64::from(self.photometer.baud)
     }
 
     /// Which of them moves an axis, and as which of its own; `None` where none does.

@@ -18,6 +18,7 @@ mod meters;
 mod motion;
 mod pose;
 mod reading;
+mod waits;
 
 pub use alignment::{Alignment, Misalignment};
 pub use axis::{Approach, Axis, LimitError, Readback};
@@ -31,6 +32,7 @@ pub use meters::{
 pub use motion::{Flight, comes_to_rest, set_out};
 pub use pose::{AXES, AxisName, AxisPositions, Pose};
 pub use reading::{DeviceTimes, Latched, Reading, ReadingKind};
+pub use waits::{SERVO_LOOK_AGAIN, SHUTTER_ACCELERATION, SHUTTER_SPEED};
 
 use spanned_toml::Document;
 
@@ -62,12 +64,6 @@ impl Rig {
     /// Whether it is a simulated rig: then so is everything that it measures.
     pub fn is_simulated(&self) -> bool {
         matches!(self.link, Link::Simulated { .. })
-    }
-
-    /// How long a meter of another make takes to tell so many readings, seconds; of gonio's own
-    /// controller, which tells their sum, nothing that counts.
-    pub fn answer_s(&self, readings: u32) -> f64 {
-        self.devices.as_ref().map_or(0.0, |devices| devices.answer_s(readings))
     }
 
     /// Its simulated twin: the same axes and detector on a simulated link, and simulated devices where it is put

@@ -12,9 +12,8 @@ use super::table::{BUS_WATCHDOG, GOAL_POSITION, PROFILE_ACCELERATION, TORQUE_ENA
 use super::{Doing, Dynamixel, PATIENCE_AT_REST, WATCHDOG, WATCHDOG_UNITS, stalled};
 use crate::device::axes::{AxesCommand, AxesEvent};
 use crate::device::driver::Trouble;
+use crate::rig::SERVO_LOOK_AGAIN;
 
-/// Between two looks at axes that move: 25 of them in the servos' patience.
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// A write of which nobody says that it arrived is repeated so often.
 const TELLS: u8 = 3;
 /// How much longer than its profile a move may take: by half, and by this.
@@ -212,7 +211,7 @@ impl Dynamixel {
             self.brake(&[]);
             self.doing =
                 Doing::Work(Work { command, stage: Stage::Braking(now + BRAKING_MAX, false) });
-            self.wake = Some(now + LOOK_AGAIN);
+            self.wake = Some(now + SERVO_LOOK_AGAIN);
             return;
         }
         if let Some(fault) = self.raised() {
@@ -285,7 +284,7 @@ impl Dynamixel {
         }
         moving.told += 1;
         self.doing = Doing::Work(Work { command, stage: Stage::Moving(moving) });
-        self.wake = Some(now + LOOK_AGAIN);
+        self.wake = Some(now + SERVO_LOOK_AGAIN);
     }
 
     /// The servos' encoders are absolute: a home is where they say that they are, if that can be.
@@ -343,7 +342,7 @@ impl Dynamixel {
         }
         if now < moving.late {
             self.doing = Doing::Work(Work { command, stage: Stage::Moving(moving) });
-            self.wake = Some(now + LOOK_AGAIN);
+            self.wake = Some(now + SERVO_LOOK_AGAIN);
             return;
         }
         let farthest = servos().max_by_key(|(_, servo, goal)| off(servo, *goal));
@@ -396,7 +395,7 @@ impl Dynamixel {
         }
         let stage = Stage::Braking(until, stands);
         self.doing = Doing::Work(Work { command: Command::Stop, stage });
-        self.wake = Some(now + LOOK_AGAIN);
+        self.wake = Some(now + SERVO_LOOK_AGAIN);
     }
 
     /// A hardware error is left by a restart alone.
@@ -436,7 +435,7 @@ impl Dynamixel {
             }),
             Err(_) if looks > 0 => {
                 self.doing = Doing::Work(Work { command, stage: Stage::Waking(looks - 1) });
-                self.wake = Some(now + LOOK_AGAIN);
+                self.wake = Some(now + SERVO_LOOK_AGAIN);
             }
             Err(silence) => self.end(AxesEvent::Trouble(Trouble::Silent(silence))),
         }

@@ -18,7 +18,7 @@ use super::units::{
     velocity_units, whole_steps,
 };
 use crate::device::axes::AxisFacts;
-use crate::rig::Readback;
+use crate::rig::{Readback, SHUTTER_ACCELERATION, SHUTTER_SPEED};
 
 /// How old a state is when a word by it arrives, seconds, at about.
 const LEAD_S: f64 = 0.02;
@@ -48,11 +48,6 @@ pub struct ShutterServo {
     /// Where it stands when none does, steps.
     pub closed: i32,
 }
-
-/// A shutter's speed, steps a second: an eighth of a turn in two tenths of one.
-const SHUTTER_SPEED: u32 = 4096;
-/// Its acceleration, steps a second squared.
-const SHUTTER_ACCELERATION: u32 = 40_960;
 
 impl ShutterServo {
     /// As a servo like any other.
