@@ -10,20 +10,7 @@ use std::time::{Duration, Instant};
 use bench::Bench;
 use bench::twins::{self, Devices};
 
-const DEVICES: &str = "\
-[[axes_link]]
-driver = \"grbl\"
-letters = { theta = \"X\", phi = \"Y\", x = \"Z\", y = \"A\" }
-zero_deg = { theta = -100, phi = -190 }
-zero_mm = { x = -55, y = -55 }
-shutter = \"flood\"
-
-[photometer]
-driver = \"keithley-6485\"
-baud = 57600
-nplc = 0.025
-";
-
+const DEVICES: &str = include_str!("bench/grbl_and_picoammeter.toml");
 const ONE_LINK: &str = "[link]\nkind = \"simulated\"\nbaud = 1_000_000\n";
 
 /// The small plan on a rig of simulated devices.

@@ -100,6 +100,8 @@ mod resolves;
 mod robust;
 mod rules;
 mod sample;
+#[cfg(test)]
+mod scattered;
 mod shift;
 mod solve;
 mod sparse;

@@ -13,23 +13,7 @@ use served::{Place, bundle, wait_until};
 /// Far below what the daemon grants clients that do not leave, on a machine that is busy.
 const AT_ONCE: Duration = Duration::from_secs(4);
 
-/// Axes on grbl, the photodiode on a picoammeter.
-const DEVICES: &str = "\
-[link]
-kind = \"simulated\"
-
-[[axes_link]]
-driver = \"grbl\"
-letters = { theta = \"X\", phi = \"Y\", x = \"Z\", y = \"A\" }
-zero_deg = { theta = -100, phi = -190 }
-zero_mm = { x = -55, y = -55 }
-shutter = \"flood\"
-
-[photometer]
-driver = \"keithley-6485\"
-baud = 57600
-nplc = 0.025
-";
+const DEVICES: &str = include_str!("../bench/grbl_and_picoammeter.toml");
 
 fn sequence_of(events: &[Value]) -> Vec<i64> {
     events.iter().map(|event| event["sequence"].as_i64().unwrap()).collect()
@@ -357,7 +341,7 @@ fn a_rig_of_other_makes_says_which_of_its_devices_stops_by_itself() {
         .rig()
         .replace("readback = \"encoder\"", "readback = \"steps\"")
         .replace("full_scale_a = 1e-", "full_scale_a = 2e-")
-        .replace("[link]\nkind = \"simulated\"\nbaud = 1_000_000\n", DEVICES);
+        .replace("baud = 1_000_000\n", DEVICES);
     place.write("rig.toml", &devices);
     let daemon = place.daemon();
     let (status, answer) = daemon.get("/status");

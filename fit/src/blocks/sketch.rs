@@ -123,10 +123,10 @@ const CELLS_MAX: usize = 1 << 16;
 mod tests {
     use super::*;
     use crate::excess::{cut_excess, excess};
+    use crate::scattered::part;
 
     /// Residuals twice as large as variances that go over some octaves say, one in twenty far off.
     fn terms(count: usize, octaves: f64) -> Vec<(f64, f64)> {
-        let part = |i: usize, step: f64| (i as f64 * step + 0.37).fract();
         let term = |i: usize| {
             let variance = 1e-4 * libm::exp2(octaves * part(i, 0.618_034));
             let normal =

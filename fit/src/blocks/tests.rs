@@ -1,13 +1,12 @@
 //! Blocks against the fit of all readings in memory.
 
 use super::{Asked, Blocks, Blockwise, Totals, fit};
+use crate::scattered::{BASIS, REGION, reading};
 use crate::{
     BasisSpec, Common, Fit, FitError, FittedNuisance, Noise, Penalised, Penalty, Ray, Readings,
-    Region, Robust, Sample, Shift, fit_readings,
+    Robust, Sample, Shift, fit_readings,
 };
 
-const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
-const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
 const READINGS: usize = 2500;
 
 /// Readings, and how what they share is made for those from one place to another.
@@ -23,18 +22,10 @@ struct Source {
 impl Source {
     /// Of a field that the basis holds, scattering by 0.41; every 50th reading is off by a lot.
     fn new(noise: impl Fn(usize, f64) -> Noise, spoilt: bool) -> Self {
-        let part = |i: usize, step: f64| (i as f64 * step + 0.37).fract();
         let sample = |i: usize| {
-            let ray = Ray {
-                x_m: 0.02 * part(i, 0.618_034) - 0.01,
-                y_m: 0.02 * part(i, 0.754_878) - 0.01,
-                theta_rad: 1.4 * part(i, 0.569_840),
-                phi_rad: 6.2 * part(i, 0.438_579),
-            };
-            let scatter = part(i, 0.233_7) + part(i, 0.871_3) - 1.0;
-            let bent = 80.0 - 30.0 * ray.theta_rad.sin().powi(2);
+            let (ray, plain) = reading(i);
             let off = if spoilt && i.is_multiple_of(50) { 9.0 } else { 0.0 };
-            let value = bent + 10.0 * ray.x_m / 0.01 + scatter + off;
+            let value = plain + off;
             Sample { ray, value, noise: noise(i, value) }
         };
         let samples = (0..READINGS).map(sample).collect();

@@ -1,24 +1,13 @@
 //! Shares against the whole.
 
 use super::*;
+use crate::scattered::{BASIS, REGION, reading};
 use crate::{Fit, Ray, Shift};
-
-const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), 1.4);
-const BASIS: BasisSpec = BasisSpec::zernike(4, 1);
 
 /// Readings of a field that the basis holds, scattering by 0.41.
 fn samples(count: usize, u: impl Fn(usize) -> Option<f64>) -> Vec<Sample> {
-    let part = |i: usize, step: f64| (i as f64 * step + 0.37).fract();
     let sample = |i: usize| {
-        let ray = Ray {
-            x_m: 0.02 * part(i, 0.618_034) - 0.01,
-            y_m: 0.02 * part(i, 0.754_878) - 0.01,
-            theta_rad: 1.4 * part(i, 0.569_840),
-            phi_rad: 6.2 * part(i, 0.438_579),
-        };
-        let noise = part(i, 0.233_7) + part(i, 0.871_3) - 1.0;
-        let bent = 80.0 - 30.0 * ray.theta_rad.sin().powi(2);
-        let value = bent + 10.0 * ray.x_m / 0.01 + noise;
+        let (ray, value) = reading(i);
         let noise = u(i).map_or(Noise::Unknown, |u| Noise::Fixed { variance: u * u });
         Sample { ray, value, noise }
     };
