@@ -5,6 +5,7 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
+use crate::functional::Along;
 use crate::measured::Measured;
 use crate::parts::demand;
 use crate::{
@@ -447,9 +448,17 @@ impl Fit {
 
     /// By what the functions can't follow.
     fn missed_variance(&self, functional: &Functional) -> f64 {
-        let finer = functional.finer() * self.parts.model.truncation;
         let missed = self.parts.truncation.iter().flat_map(|truncation| &truncation.missed);
-        missed.map(|field| functional.times_field(field).powi(2)).sum::<f64>() + finer * finer
+        let missed = missed.map(|field| functional.times_field(field).powi(2)).sum::<f64>();
+        let Some(along) = functional.along() else { return missed };
+        let finer = along.weight * self.parts.model.truncation;
+        self.unevenness(along) * (missed + finer * finer)
+    }
+
+    /// What the variance of all that is missed is multiplied by towards a direction.
+    pub(crate) fn unevenness(&self, along: Along) -> f64 {
+        let uneven = self.parts.truncation.as_ref().map(|truncation| &truncation.uneven);
+        uneven.map_or(1.0, |uneven| uneven.times(along.theta_rad, along.phi_rad))
     }
 
     fn common_shifts(&self, functional: &Functional) -> impl Iterator<Item = (&str, f64)> {

@@ -12,26 +12,34 @@ pub struct Functional {
     row: Vec<f64>,
     /// Over the functions beyond the fit's own, where it knows what it misses.
     beyond: Vec<f64>,
-    /// How much of what is finer than all functions is in it: see [`Functional::finer`].
-    finer: f64,
+    /// The one direction that it is a sum over, if there is one.
+    along: Option<Along>,
+}
+
+/// A direction, and the sum of the weights of rays along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Along {
+    pub(crate) theta_rad: f64,
+    pub(crate) phi_rad: f64,
+    pub(crate) weight: f64,
 }
 
 impl Functional {
     pub(crate) fn new(row: Vec<f64>, beyond: Vec<f64>) -> Self {
-        Self { row, beyond, finer: 0.0 }
+        Self { row, beyond, along: None }
     }
 
-    /// The same, of one direction alone: with this share of what is finer than all functions.
-    pub(crate) fn with_finer(self, finer: f64) -> Self {
-        Self { finer: finer.abs(), ..self }
+    /// The same, of one direction alone.
+    pub(crate) fn towards(self, along: Along) -> Self {
+        Self { along: Some(along), ..self }
     }
 
-    /// How much of what is finer than all functions ([`crate::Penalised::truncation`]) is in it, in the
-    /// unit of the weights. In one direction all of it, at however many places: it may be the same at
-    /// all of them. It is taken to be another in every direction, and to average out of sums over
-    /// several.
-    pub(crate) fn finer(&self) -> f64 {
-        self.finer
+    /// The one direction that it is a sum over. What is finer than all functions
+    /// ([`crate::Penalised::truncation`]), and what readings show beyond them, is in it times its weight:
+    /// in one direction all of it, at however many places, since it may be the same at all of them. It
+    /// is taken to be another in every direction, and to average out of sums over several.
+    pub(crate) fn along(&self) -> Option<Along> {
+        self.along
     }
 
     fn is_nothing(&self) -> bool {
@@ -53,7 +61,9 @@ impl Functional {
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
         self.row.iter_mut().chain(&mut self.beyond).for_each(|element| *element *= factor);
-        self.finer *= factor.abs();
+        if let Some(along) = &mut self.along {
+            along.weight *= factor;
+        }
         self
     }
 
@@ -75,13 +85,23 @@ impl Functional {
     pub fn add(&mut self, factor: f64, other: &Self) {
         assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
         assert_eq!(self.beyond.len(), other.beyond.len(), "functionals of different fits");
-        self.finer = match (self.is_nothing(), other.is_nothing()) {
-            (_, true) => self.finer,
-            (true, false) => factor.abs() * other.finer,
-            (false, false) => 0.0,
+        let added = other.along.map(|along| Along { weight: factor * along.weight, ..along });
+        self.along = match (self.is_nothing(), other.is_nothing()) {
+            (_, true) => self.along,
+            (true, false) => added,
+            (false, false) => self.along.zip(added).and_then(|(own, added)| own.and(added)),
         };
         self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
         self.beyond.iter_mut().zip(&other.beyond).for_each(|(a, b)| *a += factor * b);
+    }
+}
+
+impl Along {
+    /// Both, of one direction.
+    fn and(self, other: Self) -> Option<Self> {
+        let bits = |along: &Self| [along.theta_rad.to_bits(), along.phi_rad.to_bits()];
+        let weight = self.weight + other.weight;
+        (bits(&self) == bits(&other)).then_some(Self { weight, ..self })
     }
 }
 
@@ -135,16 +155,25 @@ impl Fit {
             let is_finite = [x_m, y_m, theta_rad, phi_rad, *weight].into_iter().all(f64::is_finite);
             assert!(is_finite, "not finite: {ray:?} of weight {weight}");
         }
-        let direction = |ray: &Ray| (ray.theta_rad.to_bits(), ray.phi_rad.to_bits());
-        let is_one = rays.windows(2).all(|two| direction(&two[0].0) == direction(&two[1].0));
-        let finer = if is_one { rays.iter().map(|(_, weight)| weight).sum() } else { 0.0 };
-        self.functional(|basis| sum_over(basis, &rays)).with_finer(finer)
+        let along = |(ray, weight): &(Ray, f64)| Along {
+            theta_rad: ray.theta_rad,
+            phi_rad: ray.phi_rad,
+            weight: *weight,
+        };
+        let first = rays.first().map(along);
+        let one = first.and_then(|first| rays[1..].iter().map(along).try_fold(first, Along::and));
+        let sum = self.functional(|basis| sum_over(basis, &rays));
+        match one {
+            Some(along) => sum.towards(along),
+            None => sum,
+        }
     }
 
     /// The mean of the radiance over the region in a direction, as a functional. Times the region's
     /// area and cos θ it is the intensity.
     pub fn mean_towards(&self, theta_rad: f64, phi_rad: f64) -> Functional {
-        self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad)).with_finer(1.0)
+        let mean = self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad));
+        mean.towards(Along { theta_rad, phi_rad, weight: 1.0 })
     }
 
     /// The flux in all directions of the chart, as a functional: from the region, through both

@@ -67,7 +67,7 @@ pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
 pub use solve::{fit, fit_flown, fit_readings, fit_seen};
 pub use symmetry::{Symmetry, SymmetryError, SymmetryTest};
-pub use truncation::Truncation;
+pub use truncation::{Truncation, Uneven};
 pub use undetermined::Cause;
 
 mod basis;

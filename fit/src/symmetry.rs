@@ -244,7 +244,12 @@ impl Fit {
             Err(error) => return Err(error),
         }
         let field = |k: usize| own.col(k).iter().chain(finer.col(k).iter()).copied().collect();
-        Ok(Truncation { missed: (0..missed.len()).map(field).collect(), ..truncation.clone() })
+        let uneven = truncation.uneven.under(symmetry);
+        Ok(Truncation {
+            missed: (0..missed.len()).map(field).collect(),
+            uneven,
+            ..truncation.clone()
+        })
     }
 
     fn factor_matrix(&self) -> Mat<f64> {

@@ -188,3 +188,27 @@ fn a_fit_without_its_readings_has_no_trials() {
     let refused = fit.trials(&fewer, None).unwrap_err();
     assert!(refused.to_string().contains("are not at hand"), "{refused}");
 }
+
+#[test]
+fn what_is_missed_is_drawn_as_large_as_it_is_in_each_direction() {
+    // A step in θ that no polynomial follows: more is missed there than elsewhere.
+    let mut normal = normals(5);
+    let u = 1e-3;
+    let stepped = |sample: Sample| {
+        let level = if sample.ray.theta_rad < 0.75 { 1.0 } else { 0.2 };
+        let noise = Noise::Fixed { variance: u * u };
+        Sample { value: level + u * normal(), noise, ..sample }
+    };
+    let samples: Vec<Sample> = samples(0.5, &mut || 0.0).into_iter().map(stepped).collect();
+    let readings = Readings::of(&samples);
+    let fit = fit::fit_readings(&readings, &REGION, BasisSpec::zernike(4, 0), None).unwrap();
+    let fit = fit.with_truncation(&samples, &[], &[], None).unwrap();
+    let ray = |theta_rad: f64| Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad: 0.3 };
+    let thetas = [0.2, 0.55, 0.7, 0.75, 0.8, 0.95, 1.2].map(ray);
+    let of: Vec<Functional> = thetas.iter().map(|ray| fit.weighted_rays([(*ray, 1.0)])).collect();
+    for (functional, spread) in of.iter().zip(spreads(&fit, &readings, &of, 20_000)) {
+        let ratio = spread.u / fit.of(functional).u;
+        // Noise moves the reported fit a little more than it does the likeliest wider model.
+        assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+    }
+}

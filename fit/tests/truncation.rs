@@ -303,3 +303,53 @@ fn what_is_finer_still_is_in_sums_of_one_direction_and_not_of_several() {
     let squares: f64 = budget.iter().map(|part| part.u * part.u).sum();
     assert!((squares.sqrt() - one.u).abs() < 1e-12 * one.u);
 }
+
+/// Bright within 0.8 rad of the axis, the edge as wide as a reading is from the next.
+fn beam(theta_rad: f64) -> f64 {
+    0.2 + 0.8 / (1.0 + libm::exp((theta_rad - 0.8) / 0.02))
+}
+
+#[test]
+fn more_is_missed_at_the_shoulder_of_a_beam_than_beside_it() {
+    let mut die = Die::new(11);
+    let noise = Noise::Fixed { variance: SIGMA * SIGMA };
+    let sample = |ray: &Ray| {
+        let value = beam(ray.theta_rad) + SIGMA * die.normal();
+        Sample { ray: *ray, value, noise }
+    };
+    let samples: Vec<Sample> = raster_rays(&REGION, 30, 16, 1).iter().map(sample).collect();
+    let fit = plain(&samples, &[]).with_truncation(&samples, &[], &[], None).unwrap();
+    let ray = |theta_rad: f64| Ray { x_m: 0.0, y_m: 0.015, theta_rad, phi_rad: 0.2 };
+    let u = |theta_rad: f64| fit.radiance(&ray(theta_rad)).u;
+    // Over whole turns of the basis' ripples, which are in u too.
+    let mean_u = |from: f64| (0..30).map(|i| u(from + 0.01 * f64::from(i))).sum::<f64>() / 30.0;
+    assert!(mean_u(0.65) > 1.3 * mean_u(0.2), "{} {}", mean_u(0.65), mean_u(0.2));
+    let rays: Vec<f64> = (0..120).map(|i| 0.01 * f64::from(i)).collect();
+    let holds = |theta_rad: &&f64| {
+        let estimate = fit.radiance(&ray(**theta_rad));
+        (estimate.value - beam(**theta_rad)).abs() <= 1.96 * estimate.u
+    };
+    let held = rays.iter().filter(holds).count();
+    assert!(held * 100 >= 93 * rays.len(), "{held} of {}", rays.len());
+}
+
+#[test]
+fn a_noise_known_to_a_factor_of_ten_explains_no_misfit_of_a_thousand() {
+    // A bright spot along the axis alone, and noise in proportion to the signal: noise a thousand times
+    // as large as stated could make it, but whoever states a noise knows better.
+    let mut die = Die::new(2);
+    let sample = |ray: &Ray| {
+        let level = if ray.theta_rad < 0.05 { 2.0 } else { libm::cos(ray.theta_rad).powi(8) };
+        let sigma = 1e-4 * level + 1e-6;
+        let noise = Noise::Fixed { variance: sigma * sigma };
+        Sample { ray: *ray, value: level + sigma * die.normal(), noise }
+    };
+    let mut rays = raster_rays(&REGION, 11, 30, 1);
+    // Along the axis once.
+    rays.drain(1..30);
+    let samples: Vec<Sample> = rays.iter().map(sample).collect();
+    let fit = plain(&samples, &[]).with_truncation(&samples, &[], &[], None).unwrap();
+    let axis = fit.radiance(&Ray { x_m: 0.0, y_m: 0.015, theta_rad: 0.0, phi_rad: 0.0 });
+    assert!((axis.value - 2.0).abs() > 0.1, "the basis follows the spot");
+    assert!((axis.value - 2.0).abs() <= 3.0 * axis.u, "{} ± {}", axis.value, axis.u);
+}

@@ -50,6 +50,8 @@ pub struct Trial<'t> {
     trials: &'t Trials<'t>,
     /// Over the fit's own functions and those beyond.
     field: &'t [f64],
+    /// What of that the fit's functions can't follow; empty where nothing is known to be missed.
+    missed: &'t [f64],
     /// What is finer than all functions, along a ray.
     finer: f64,
 }
@@ -121,22 +123,23 @@ impl Trials<'_> {
     ) {
         let p = self.fit.coefficients().len();
         let whole = p + self.missed().map_or(0, |missed| missed.first().map_or(0, Vec::len) - p);
-        let most = (NUMBERS_MAX / (whole + self.columns.len())).clamp(1, BLOCK_MAX);
+        let most = (NUMBERS_MAX / (2 * whole + self.columns.len())).clamp(1, BLOCK_MAX);
         let mut left = count;
         while left > 0 {
             let block = left.min(most);
-            let fields = self.block(block, whole, normal);
+            let Block { fields, missed } = self.block(block, whole, normal);
             for t in 0..block {
                 let finer = self.fit.parts().model.truncation;
                 let finer = if finer > 0.0 { finer * normal() } else { 0.0 };
-                each(&Trial { trials: self, field: fields.col_as_slice(t), finer });
+                let missed = missed.as_ref().map_or(&[][..], |missed| missed.col_as_slice(t));
+                each(&Trial { trials: self, field: fields.col_as_slice(t), missed, finer });
             }
             left -= block;
         }
     }
 
     /// Fields of so many trials but for the scale: a column each, over all functions.
-    fn block(&self, count: usize, whole: usize, normal: &mut dyn FnMut() -> f64) -> Mat<f64> {
+    fn block(&self, count: usize, whole: usize, normal: &mut dyn FnMut() -> f64) -> Block {
         let coefficients = self.fit.coefficients();
         let p = coefficients.len();
         let refitted = self.refitted(count, normal);
@@ -150,11 +153,14 @@ impl Trials<'_> {
             });
             fields += shifts * draws(self.shifts.len(), count, normal);
         }
-        if let Some(missed) = self.missed() {
+        let missed = self.missed().map(|missed| {
             let missed_fields = Mat::from_fn(whole, missed.len(), |i, k| missed[k][i]);
-            fields += missed_fields * draws(missed.len(), count, normal);
+            missed_fields * draws(missed.len(), count, normal)
+        });
+        if let Some(missed) = &missed {
+            fields += missed;
         }
-        fields
+        Block { fields, missed }
     }
 
     /// What the noise of so many trials does to the coefficients: a column each.
@@ -218,7 +224,16 @@ impl Trial<'_> {
             self.coefficients().len(),
             "a functional of another fit"
         );
-        functional.times_field(self.field) + functional.finer() * self.finer
+        functional.times_field(self.field) + self.along_one(functional)
+    }
+
+    /// What is in a functional of one direction alone beside the field: what is finer than all
+    /// functions, and all that is missed as much larger as it is there.
+    fn along_one(&self, functional: &Functional) -> f64 {
+        let Some(along) = functional.along() else { return 0.0 };
+        let times = self.trials.fit.unevenness(along).sqrt();
+        let more = if self.missed.is_empty() { 0.0 } else { functional.times_field(self.missed) };
+        (times - 1.0) * more + times * along.weight * self.finer
     }
 
     /// The radiance along a ray.
@@ -241,7 +256,8 @@ impl Trial<'_> {
             value
         };
         let (ray, radiance) = along(fit, &self.trials.tops, &mut value);
-        TrialPeak { radiance: radiance + self.finer, ray }
+        let there = fit.weighted_rays([(ray, 1.0)]);
+        TrialPeak { radiance: radiance + self.along_one(&there), ray }
     }
 
     /// The coefficients of the fit's own functions.
@@ -254,6 +270,14 @@ impl Trial<'_> {
     pub fn fit(&self) -> Fit {
         self.trials.fit.bare(self.coefficients().to_vec())
     }
+}
+
+/// Fields of several trials, a column each.
+struct Block {
+    /// Over all functions.
+    fields: Mat<f64>,
+    /// What of them the fit's functions can't follow.
+    missed: Option<Mat<f64>>,
 }
 
 fn draws(rows: usize, columns: usize, normal: &mut dyn FnMut() -> f64) -> Mat<f64> {

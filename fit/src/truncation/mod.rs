@@ -15,12 +15,14 @@
 //!
 //! Σ = S Sᵀ with S upper triangular, the fit's own functions first: its first columns are what noise
 //! does to the fit, the others are fields that the fit misses. These and the difference of the two
-//! fits are the *missed fields*, one u of an independent component each.
+//! fits are the *missed fields*, one u of an independent component each. Along a ray they count for more
+//! where the readings around it are foretold worse by all the others than the model expects: see [`Uneven`].
 //!
 //! Where finer functions make the readings no likelier there is no truncation to speak of, and the
 //! fit stays as it is. What is finer than all readings nothing here can know.
 
 mod likeliest;
+mod uneven;
 mod wider;
 
 use crate::basis::Basis;
@@ -31,6 +33,7 @@ use crate::penalty::Prior;
 use crate::solve::{levels, needs_a_side, sensitivities};
 use crate::weights::Settled;
 use crate::{Angular, BasisSpec, Common, Fit, FitError, Influence, Position, Ray, Sample};
+pub use uneven::Uneven;
 use wider::Wider;
 
 /// What a fit misses.
@@ -44,6 +47,9 @@ pub struct Truncation {
     /// How much likelier the readings are with the finer functions: twice the logarithm of the ratio
     /// of marginal likelihoods.
     pub gain: f64,
+    /// Where more is missed than elsewhere: in the u of what is along one direction alone. Over sums
+    /// it averages out.
+    pub uneven: Uneven,
 }
 
 impl Fit {

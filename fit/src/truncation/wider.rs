@@ -4,7 +4,7 @@
 use super::likeliest::{Hold, Likeliest, POWER, Shares};
 use super::{Shared, Truncation};
 use crate::basis::{Basis, dot};
-use crate::beam::design::Design;
+use crate::beam::design::{Design, Room};
 use crate::parts::Parts;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
@@ -29,6 +29,9 @@ pub(super) struct Wider<'s> {
     /// Harmonics among `beyond` that the fit's own polynomials are sums of.
     pub(super) polynomials: Vec<usize>,
 }
+
+/// Of the fit's functions, of the finer ones, and a row of these.
+pub(super) type Rooms = (Room, Room, Vec<f64>);
 
 /// All readings under some variances: a triangle of the fit's functions, what samples share, the
 /// finer functions, and the values.
@@ -61,7 +64,7 @@ impl Wider<'_> {
             return Ok((joint, found));
         }
         let other = self.joint(stated)?;
-        let by_stated = self.at_scales(&other, 1.0..=f64::MAX)?;
+        let by_stated = self.at_scales(&other, 1.0..=SCALE_MOST)?;
         let is_better = by_stated.deviance < found.deviance;
         Ok(if is_better { (other, by_stated) } else { (joint, found) })
     }
@@ -78,13 +81,11 @@ impl Wider<'_> {
 
     /// One pass of all rows, each divided by its standard uncertainty.
     fn joint(&self, variances: &[f64]) -> Result<Joint, FitError> {
-        let Self { own, beyond, kept, shared, values, .. } = self;
-        let (p, q) = (own.basis().len(), kept.len());
+        let (q, values) = (self.kept.len(), self.values);
         let known = self.known();
         let mut triangle = Triangle::new(known + q, 1);
-        let (mut own_room, mut room) = (own.room(), beyond.room());
+        let mut rooms = self.rooms();
         let mut row = vec![0.0; known + q + 1];
-        let mut all = vec![0.0; beyond.basis().len()];
         for (i, (value, variance)) in values.iter().zip(variances).enumerate() {
             let weight = 1.0 / variance.sqrt();
             if !weight.is_finite() {
@@ -93,14 +94,7 @@ impl Wider<'_> {
             if weight == 0.0 {
                 continue;
             }
-            own.row(i, &mut own_room, &mut row[..p]);
-            beyond.row(i, &mut room, &mut all);
-            for (out, side) in row[p..].iter_mut().zip(&shared.sides) {
-                *out = side[i];
-            }
-            for (out, k) in row[known..].iter_mut().zip(kept) {
-                *out = all[*k];
-            }
+            self.row(i, &mut rooms, &mut row[..known + q]);
             row[known + q] = *value;
             for value in &mut row {
                 *value *= weight;
@@ -111,6 +105,21 @@ impl Wider<'_> {
         self.absorb_known(&mut held);
         let solution = held.solve().ok_or(FitError::OutOfRange)?;
         Ok(Joint { triangle, solution, variances: variances.to_vec() })
+    }
+
+    /// What rows are made in.
+    pub(super) fn rooms(&self) -> Rooms {
+        (self.own.room(), self.beyond.room(), vec![0.0; self.beyond.basis().len()])
+    }
+
+    /// A reading's row over the fit's functions, what samples share, and the finer functions.
+    pub(super) fn row(&self, i: usize, (own_room, room, all): &mut Rooms, row: &mut [f64]) {
+        let (own, others) = row.split_at_mut(self.own.basis().len());
+        let (sides, finer) = others.split_at_mut(self.shared.sides.len());
+        self.own.row(i, own_room, own);
+        self.beyond.row(i, room, all);
+        sides.iter_mut().zip(&self.shared.sides).for_each(|(out, side)| *out = side[i]);
+        finer.iter_mut().zip(&self.kept).for_each(|(out, k)| *out = all[*k]);
     }
 
     /// The fit's functions and what samples share.
@@ -231,21 +240,21 @@ impl Wider<'_> {
             self.absorb_own(&mut triangle, found)?;
         }
         let solution = triangle.solve().ok_or(FitError::OutOfRange)?;
-        let factor = solution.inverse();
-        let truncation = is_wider.then(|| {
-            let columns = known..known + q;
-            let columns = columns.map(|j| self.spread(&factor[j * (j + 1) / 2..][..=j]));
-            let off = self.off(fit, &solution.unknowns(0));
-            Truncation {
-                beyond: self.beyond.basis().spec(),
-                missed: std::iter::once(off).chain(columns).collect(),
-                gain: found.gain,
-            }
-        });
-        let factor = factor[..p * (p + 1) / 2].to_vec();
+        let whole = solution.inverse();
+        let factor = whole[..p * (p + 1) / 2].to_vec();
         let variances: Vec<f64> =
             joint.variances.iter().map(|variance| variance * found.scale).collect();
         let rough = self.rough(fit, &variances);
+        let truncation = is_wider.then(|| {
+            let unknowns = solution.unknowns(0);
+            let columns = known..known + q;
+            let columns = columns.map(|j| self.spread(&whole[j * (j + 1) / 2..][..=j]));
+            let off = self.off(fit, &unknowns);
+            let missed: Vec<Vec<f64>> = std::iter::once(off).chain(columns).collect();
+            let uneven = self.uneven(joint, found.scale, &solution);
+            let beyond = self.beyond.basis().spec();
+            Truncation { beyond, missed, gain: found.gain, uneven }
+        });
         let influence =
             fit.influence().map(|influence| influence.under(variances, &self.own, &factor));
         // Of reweighed readings the coefficients scatter by other than their weights say.
@@ -345,3 +354,6 @@ const AROUND: [f64; 4] = [1.0, 10.0, 100.0, 1e4];
 const GAIN_MIN: f64 = 8.0;
 /// Of variances that nothing was stated about.
 const SCALE_LEAST: f64 = 1e-12;
+/// Of stated ones: who states a noise knows it to a factor of ten. What is beyond that the functions
+/// can't follow, or it is as large in the dark as in the light.
+const SCALE_MOST: f64 = 100.0;
