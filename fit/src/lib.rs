@@ -62,7 +62,7 @@ pub use predict::{FittedField, Predicted, predict};
 pub use readings::{Fitted as FittedNuisance, Readings, Weighed};
 pub use resolves::{Limit, Resolves, Width};
 pub use robust::Robust;
-pub use rules::{Ruled, Rules, fit_ruled, fit_wished};
+pub use rules::{Ruled, Rules, fit_known, fit_ruled, fit_valued, fit_wished};
 pub use sample::{Noise, Ray, Region, Sample};
 pub use shift::{Common, RayShift, Shift, ValueShift};
 pub use solve::{fit, fit_flown, fit_readings, fit_seen};

@@ -48,12 +48,46 @@ pub fn fit_wished(
     wish: &Wish,
     optics: Option<&Optics>,
 ) -> Result<Ruled, FitError> {
+    let (fit, choice) = fit_chosen(readings, region, wish, optics)?;
+    Ok(Ruled { choice, ..fit.truncated(readings, &wish.rules, optics)? })
+}
+
+/// The same without what its functions can't follow in u: where the field's values are asked for alone,
+/// in a fraction of the time.
+pub fn fit_valued(
+    readings: &Readings<'_>,
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<Ruled, FitError> {
+    let (fit, choice) = fit_chosen(readings, region, wish, optics)?;
+    Ok(Ruled { choice, ..fit.ruled(&wish.rules)? })
+}
+
+/// As [`fit_wished`] in a basis that is known.
+pub fn fit_known(
+    readings: &Readings<'_>,
+    region: &Region,
+    model: Penalised,
+    rules: &Rules,
+    optics: Option<&Optics>,
+) -> Result<Ruled, FitError> {
+    let of_rules = Readings { robust: rules.robust, ..*readings };
+    crate::fit_readings(&of_rules, region, model, optics)?.truncated(readings, rules, optics)
+}
+
+fn fit_chosen(
+    readings: &Readings<'_>,
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<(Fit, Option<Choice>), FitError> {
     check_readings(readings)?;
     let said: Vec<Sample> = kept(readings, |i| readings.limits.binary_search(&i).is_err());
     let (model, choice) = choose(&said, region, wish, optics)?;
-    let rules = &wish.rules;
-    let readings = &Readings { robust: rules.robust, ..*readings };
-    let (mut fit, mut choice) = (crate::fit_readings(readings, region, model, optics)?, choice);
+    let robust = wish.rules.robust;
+    let readings = &Readings { robust, ..*readings };
+    let fit = crate::fit_readings(readings, region, model, optics)?;
     let outlying = |fit: &Fit| {
         let weighed = fit.weighed()?;
         let any = (0..weighed.weights.len()).any(|i| weighed.is_outlier(i));
@@ -62,18 +96,14 @@ pub fn fit_wished(
             kept(readings, |i| !weighed.is_outlier(i) && !is_limit(i))
         })
     };
-    if rules.robust != Robust::None
+    if robust != Robust::None
         && choice.is_some()
         && let Some(said) = outlying(&fit)
     {
-        let model;
-        (model, choice) = choose(&said, region, wish, optics)?;
-        fit = crate::fit_readings(readings, region, model, optics)?;
+        let (model, choice) = choose(&said, region, wish, optics)?;
+        return Ok((crate::fit_readings(readings, region, model, optics)?, choice));
     }
-    let Readings { samples, flown, common, .. } = *readings;
-    // Before what the rules do to the field: only of the fit itself it is known what readings did to it.
-    let fit = fit.with_truncation(samples, flown, common, optics)?;
-    Ok(Ruled { choice, ..fit.ruled(rules)? })
+    Ok((fit, choice))
 }
 
 /// The same in a basis that is known, without what its functions can't follow.
@@ -90,6 +120,18 @@ pub fn fit_ruled(
 }
 
 impl Fit {
+    /// By the rules, with what its functions can't follow. Before what the rules do to the field: only
+    /// of the fit itself it is known what readings did to it.
+    fn truncated(
+        self,
+        readings: &Readings<'_>,
+        rules: &Rules,
+        optics: Option<&Optics>,
+    ) -> Result<Ruled, FitError> {
+        let Readings { samples, flown, common, .. } = *readings;
+        self.with_truncation(samples, flown, common, optics)?.ruled(rules)
+    }
+
     /// The field with the symmetry asked for, if the readings bear it, and above zero.
     pub fn ruled(self, rules: &Rules) -> Result<Ruled, FitError> {
         let mut ruled = Ruled { fit: self, choice: None, symmetry: None, nonnegative: None };

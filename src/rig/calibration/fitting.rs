@@ -49,6 +49,33 @@ impl Calibrated {
         Ok(self.fitted(input, ruled, region, optics))
     }
 
+    /// The same for the field's values alone: u has no part for what the functions can't follow.
+    pub fn fit_valued(
+        &self,
+        region: &Region,
+        wish: &Wish,
+        optics: Option<&Optics>,
+    ) -> Result<Fit, FitError> {
+        let input = self.fit_input(&wish.rules);
+        demand_drift(input.drift.as_ref(), &wish.rules)?;
+        let flown = self.flown(&input);
+        Ok(fit::fit_valued(&input.readings(&flown), region, wish, optics)?.fit)
+    }
+
+    /// As [`fit`](Self::fit) with a basis and a penalty that are known.
+    pub fn fit_known(
+        &self,
+        region: &Region,
+        model: Penalised,
+        rules: &Rules,
+        optics: Option<&Optics>,
+    ) -> Result<Fit, FitError> {
+        let input = self.fit_input(rules);
+        demand_drift(input.drift.as_ref(), rules)?;
+        let flown = self.flown(&input);
+        Ok(fit::fit_known(&input.readings(&flown), region, model, rules, optics)?.fit)
+    }
+
     /// Hands over trials of the readings that a fit was made of, by the rules and the optics that it
     /// was made with.
     pub fn tried<T>(
@@ -63,7 +90,8 @@ impl Calibrated {
         Ok(make(&fitted.fit.trials(&input.readings(&flown), optics)?))
     }
 
-    /// The same with a basis and a penalty that are known.
+    /// The same with a basis and a penalty that are known, and no part in u for what the functions
+    /// can't follow.
     pub fn fit_as(
         &self,
         region: &Region,

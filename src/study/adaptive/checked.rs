@@ -1,6 +1,6 @@
 //! What sweeps say of a fit that has not seen them.
 
-use fit::{Fit, Optics};
+use fit::{Fit, Optics, Penalised};
 
 use super::Terms;
 use super::scans::Scan;
@@ -14,6 +14,8 @@ const Z_90: f64 = 1.281_551_565_544_600_4;
 /// An error estimated from checks, relative to the radiance's root mean square.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Checked {
+    /// The basis that the other sweeps asked for.
+    pub(super) model: Penalised,
     pub(super) relative: f64,
     /// What it is below with a confidence of 90 %, by the scatter among the checks.
     pub(super) upper_relative: f64,
@@ -38,7 +40,7 @@ pub(super) fn checked(
     let seen: Vec<Sample> =
         samples.filter(|(place, _)| !is_held(*place)).map(|(_, sample)| sample.clone()).collect();
     let rest = Calibrated { samples: seen, ..calibrated.clone() };
-    let fit = rest.fit(&terms.region, &terms.plan.fit, terms.optics.as_ref())?.fit;
+    let fit = rest.fit_valued(&terms.region, &terms.plan.fit, terms.optics.as_ref())?;
     let squares: Vec<f64> = checks
         .iter()
         .filter_map(|scan| mean_square_error(&fit, terms.optics.as_ref(), calibrated, scan))
@@ -48,7 +50,8 @@ pub(super) fn checked(
     }
     let (mean, upper) = mean_and_upper(&squares);
     let relative = |square: f64| libm::sqrt(square.max(0.0) / mean_square);
-    Ok(Some(Checked { relative: relative(mean), upper_relative: relative(upper) }))
+    let (relative, upper_relative) = (relative(mean), relative(upper));
+    Ok(Some(Checked { model: fit.model(), relative, upper_relative }))
 }
 
 /// Of a sweep, weighted with throughput, its readings' own noise taken out.

@@ -272,19 +272,26 @@ impl State<'_> {
     /// What the checks, and the exitance's own uncertainty, say of a fit.
     fn ask_fit(&mut self, account: &mut Account) {
         self.is_asked = true;
+        let mut model = None;
         if self.terms.adaptive.radiance_relative.is_some() {
             let mean_square = self.between.mean_square();
             // A fit that is refused says nothing yet; more sweeps determine it.
             let found = checked(self.terms, self.calibrated, self.scans, mean_square);
-            if let Ok(Some(Checked { relative, upper_relative })) = found {
+            if let Ok(Some(Checked { model: chosen, relative, upper_relative })) = found {
+                model = Some(chosen);
                 account.checked_relative = Some(relative);
                 account.checked_upper_relative = Some(upper_relative);
             }
         }
         if self.terms.adaptive.asks_exitance() {
             let Terms { plan, region, optics, .. } = self.terms;
-            let whole = self.calibrated.fit(region, &plan.fit, optics.as_ref());
-            self.whole = whole.ok().map(|fitted| fitted.fit);
+            let optics = optics.as_ref();
+            // The basis that all but the checks ask for is the one of all: choosing it takes longest.
+            let whole = match model {
+                Some(model) => self.calibrated.fit_known(region, model, &plan.fit.rules, optics),
+                None => self.calibrated.fit(region, &plan.fit, optics).map(|fitted| fitted.fit),
+            };
+            self.whole = whole.ok();
             account.exitance_u_relative = self.whole.as_ref().and_then(|fit| u(fit.exitance()));
             let shape = self.whole.as_ref().map(|fit| fit.without_scale(&self.calibrated.scales()));
             account.exitance_within_region_u_relative =
