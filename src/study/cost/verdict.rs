@@ -69,6 +69,13 @@ impl Target {
         }
     }
 
+    fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Radiance(most) => Self::Radiance(factor * most),
+            Self::Exitance(most) => Self::Exitance(factor * most),
+        }
+    }
+
     /// Whether the median of runs meets it; runs of one rung and one strategy, other seeds.
     pub fn is_met(self, runs: &[Run]) -> bool {
         let (most, error): (f64, fn(&Run) -> f64) = match self {
@@ -117,6 +124,13 @@ impl Climb {
         self.reached.iter().any(|reached| reached.at.is_none() && reached.target.is_met(runs))
     }
 
+    /// Whether these runs of a rung come so close to a target that is open that others, of other seeds,
+    /// might meet it.
+    pub fn might_meet(&self, runs: &[Run]) -> bool {
+        let might = |target: Target| target.times(MIGHT).is_met(runs);
+        self.reached.iter().any(|reached| reached.at.is_none() && might(reached.target))
+    }
+
     /// Takes the runs of the next rung.
     pub fn settle(&mut self, runs: &[Run]) {
         let (Some(first), Some(rig_s)) = (runs.first(), median(runs.iter().map(|r| r.rig_s)))
@@ -136,6 +150,9 @@ impl Climb {
         self.reached
     }
 }
+
+/// A run off by more than so many times a target is not made again with other seeds.
+const MIGHT: f64 = 2.0;
 
 /// One strategy beside a baseline at one target, over the common scenes.
 #[derive(Debug, Clone, PartialEq)]
@@ -245,6 +262,8 @@ pub(super) mod tests {
         };
         climb.settle(&of(10.0, [0.04, 0.2, 0.06]));
         assert!(climb.would_meet(&of(20.0, [0.3, 0.02, 0.01])));
+        assert!(!climb.would_meet(&of(20.0, [0.07; 3])) && climb.might_meet(&of(20.0, [0.07; 3])));
+        assert!(!climb.might_meet(&of(20.0, [0.11; 3])));
         climb.settle(&of(20.0, [0.3, 0.02, 0.01]));
         assert!(!climb.is_done());
         climb.settle(&of(40.0, [0.004, 0.004, 0.004]));

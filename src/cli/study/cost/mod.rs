@@ -176,13 +176,17 @@ fn climb(
         if open.is_empty() {
             continue;
         }
-        let mut runs = Vec::new();
-        for seed in 1..=asked.seeds {
-            runs.extend(bench.runs(&rung, seed, &open)?);
+        let mut runs = bench.runs(&rung, 1, &open)?;
+        // What is far off with one seed no other seed brings to a target.
+        let close = climbs
+            .iter()
+            .filter(|(s, climb)| open.contains(s) && climb.might_meet(&of_strategy(&runs, *s)));
+        let close: Vec<Strategy> = close.map(|(strategy, _)| *strategy).collect();
+        for seed in 2..=asked.seeds {
+            runs.extend(bench.runs(&rung, seed, &close)?);
         }
         for (strategy, climb) in climbs.iter_mut().filter(|(s, _)| open.contains(s)) {
-            let mut mine: Vec<Run> =
-                runs.iter().filter(|run| run.strategy == *strategy).cloned().collect();
+            let mut mine = of_strategy(&runs, *strategy);
             if climb.would_meet(&mine) {
                 for seed in asked.seeds + 1..=asked.quoted_seeds {
                     mine.extend(bench.runs(&rung, seed, &[*strategy])?);
@@ -194,6 +198,10 @@ fn climb(
     }
     let reached = climbs.into_iter().flat_map(|(_, climb)| climb.reached()).collect();
     Ok((all, reached))
+}
+
+fn of_strategy(runs: &[Run], strategy: Strategy) -> Vec<Run> {
+    runs.iter().filter(|run| run.strategy == strategy).cloned().collect()
 }
 
 /// The ladder's rungs with the time that they take, in its order.

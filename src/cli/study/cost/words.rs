@@ -59,6 +59,12 @@ pub(super) fn section(found: &Found, document: &Document) -> String {
         counted(seeds, "places", "place"),
         counted(quoted_seeds, "is", "are"),
     );
+    if seeds > 1 {
+        text.push_str(
+            " A rung that the first seed misses every open target with by more than a factor of two \
+             is tried with no other.",
+        );
+    }
     if longest_s.is_finite() {
         let _ = write!(text, " Rungs of more than {longest_s} s were left out.");
     }
