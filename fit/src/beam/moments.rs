@@ -87,19 +87,28 @@ impl Averager {
                 let (x, y) = sight.place(shear.place((s1, s2)));
                 let (x, y) = (x * scale.0, y * scale.1);
                 reach = (reach.0.max(x.abs()), reach.1.max(y.abs()));
+                powers.0[0] = place.weight;
                 for k in 0..degree {
                     powers.0[k + 1] = powers.0[k] * x;
                     powers.1[k + 1] = powers.1[k] * y;
                 }
-                let pairs = (0..=degree).flat_map(|total| (0..=total).map(move |n| (total - n, n)));
-                for (mean, (m, n)) in scratch.position.iter_mut().zip(pairs) {
-                    *mean += place.weight * powers.0[m] * powers.1[n];
-                }
+                add_powers(&powers.0, &powers.1, &mut scratch.position);
             }
             scratch.direction_along(direction, basis);
             scratch.add(node.weight, &mut means);
         }
         Moment { reach, means }
+    }
+}
+
+/// Adds the products of powers of two numbers, in the order of the position terms.
+fn add_powers(of_x: &[f64], of_y: &[f64], sums: &mut [f64]) {
+    let mut rest = sums;
+    for total in 0..of_x.len() {
+        let (own, others) = rest.split_at_mut(total + 1);
+        let products = of_x[..=total].iter().rev().zip(&of_y[..=total]);
+        own.iter_mut().zip(products).for_each(|(sum, (x, y))| *sum += x * y);
+        rest = others;
     }
 }
 
