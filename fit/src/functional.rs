@@ -35,9 +35,10 @@ impl Functional {
     }
 
     /// The one direction that it is a sum over. What is finer than all functions
-    /// ([`crate::Penalised::truncation`]), and what readings show beyond them, is in it times its weight:
-    /// in one direction all of it, at however many places, since it may be the same at all of them. It
-    /// is taken to be another in every direction, and to average out of sums over several.
+    /// ([`crate::Penalised::truncation`]) is in it times its weight: in one direction all of it, at
+    /// however many places, since it may be the same at all of them; and there the field may be
+    /// rougher than elsewhere ([`crate::Uneven`]). Both are taken to be another in every direction, and
+    /// to average out of sums over several.
     pub(crate) fn along(&self) -> Option<Along> {
         self.along
     }

@@ -11,7 +11,8 @@
 //! (a sample of the posterior by perturbed data: Papandreou and Yuille 2010, "Gaussian sampling by
 //! local perturbations"), and so is what is known beforehand of what was fitted along. What a
 //! component does to the coefficients is linear, as in the fit's own u. What the functions can't
-//! follow ([`Truncation`]) is a draw for each field missed.
+//! follow ([`Truncation`]) is a draw for each field missed, as much larger along a ray as the field is
+//! rougher there.
 //!
 //! This room rolls no dice: normal deviates are handed in.
 
