@@ -62,6 +62,23 @@ fn runs_that_were_kept_are_not_made_again_and_say_the_same() {
 }
 
 #[test]
+fn of_lamps_whose_basis_is_chosen_the_exitance_beyond_what_was_measured_holds_too() {
+    let bench = Bench::empty();
+    let words = ["study", "coverage", "--scenes", "photometric", "--unpinned", "--runs", "8"];
+    let more = ["--seed", "2", "--out", "found", "--json"];
+    let said = bench.gonio(&[&words[..], &more].concat()).json();
+    let is_asked = |pool: &&Value| {
+        pool["scene"] == "photometric"
+            && pool["scale"] == "known exactly"
+            && pool["quantity"] == "exitance"
+    };
+    let pool = said["pools"].as_array().unwrap().iter().find(is_asked).unwrap();
+    // By the chosen functions alone it was off by 9 u.
+    let rms = pool["rms_error_over_u"].as_f64().unwrap();
+    assert!((0.2..2.0).contains(&rms), "{pool}");
+}
+
+#[test]
 fn what_makes_no_sense_is_refused_before_anything_is_run() {
     let bench = Bench::empty();
     let study = |words: &[&str]| bench.gonio(&[&["study", "coverage"], words].concat());

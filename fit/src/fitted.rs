@@ -5,36 +5,18 @@
 use crate::basis::{Basis, dot};
 use crate::beam::Optics;
 use crate::beam::design::readings;
+use crate::estimate::INDEPENDENT;
+use crate::extrapolation::Extrapolation;
 use crate::functional::Along;
 use crate::measured::Measured;
 use crate::parts::demand;
 use crate::{
-    BasisSpec, BeamRows, Cause, CommonShift, FitError, Functional, Influence, Parts, Penalised,
-    Penalty, Ray, Region, Weighed, sparse,
+    BasisSpec, BeamRows, Cause, CommonShift, Contribution, EXTRAPOLATION, Estimate, FitError,
+    Functional, Influence, Parts, Penalised, Penalty, Ray, Region, TRUNCATION, Weighed, sparse,
 };
 use radiometry::DomainError;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
-
-/// A value with its combined standard uncertainty (k = 1).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The best value.
-    pub value: f64,
-    /// The standard uncertainty by all components.
-    pub u: f64,
-    /// By what is independent from reading to reading alone: it falls as more is measured.
-    pub u_independent: f64,
-}
-
-/// A row of an uncertainty budget.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Contribution {
-    /// `independent`, or the name of a common component.
-    pub name: String,
-    /// Its part of the standard uncertainty; the parts' squares add to the whole's.
-    pub u: f64,
-}
 
 /// The fitted field L(x, y, θ, φ), with its covariance.
 #[derive(Debug, Clone)]
@@ -48,6 +30,7 @@ pub struct Fit {
     /// Of a fit in many local functions, instead of the parts' factor.
     sparse: Option<Arc<sparse::Factor>>,
     measured: Option<Measured>,
+    extrapolation: Option<Arc<Extrapolation>>,
 }
 
 impl Fit {
@@ -61,6 +44,7 @@ impl Fit {
             influence: None,
             weighed: None,
             measured: None,
+            extrapolation: None,
             sparse: None,
         })
     }
@@ -83,6 +67,7 @@ impl Fit {
             influence: None,
             weighed: None,
             measured: None,
+            extrapolation: None,
             sparse,
         })
     }
@@ -103,6 +88,16 @@ impl Fit {
 
     pub(crate) fn with_measured(self, measured: Option<Measured>) -> Self {
         Self { measured, ..self }
+    }
+
+    pub(crate) fn extrapolated(self, extrapolation: Extrapolation) -> Self {
+        Self { extrapolation: Some(Arc::new(extrapolation)), ..self }
+    }
+
+    /// What other functions make of where nothing was measured; `None` of a fit whose functions were
+    /// pinned, and of one that was stored and taken up again.
+    pub(crate) fn extrapolation(&self) -> Option<&Extrapolation> {
+        self.extrapolation.as_deref()
     }
 
     /// Where the samples lay; `None` of a fit that was stored and taken up again, or read in blocks.
@@ -148,6 +143,7 @@ impl Fit {
             influence,
             weighed,
             measured: None,
+            extrapolation: None,
             sparse: None,
         }
     }
@@ -234,7 +230,7 @@ impl Fit {
         let own = self.basis.exitance_within(theta_max_rad)?;
         let within = |basis: &Basis| basis.exitance_within(theta_max_rad);
         let beyond = self.beyond.as_ref().map(within).transpose()?.unwrap_or_default();
-        Ok(Functional::new(own, beyond))
+        Ok(Functional::new(own, beyond).with_unmeasured(self.unmeasured_within(theta_max_rad)))
     }
 
     fn sum_within_region(&self) -> Functional {
@@ -410,7 +406,9 @@ impl Fit {
 
     /// The one door from coefficients to a number with its uncertainty.
     pub(crate) fn estimate(&self, functional: &Functional) -> Estimate {
-        let independent = self.noise_variance(functional) + self.missed_variance(functional);
+        let independent = self.noise_variance(functional)
+            + self.missed_variance(functional)
+            + functional.unmeasured_variance();
         let common = self.common_shifts(functional).map(|(_, shift)| shift * shift);
         Estimate {
             value: dot(functional.row(), &self.parts.coefficients),
@@ -426,6 +424,10 @@ impl Fit {
         if self.parts.truncation.is_some() || missed > 0.0 {
             let u = missed.sqrt();
             budget.push(Contribution { name: TRUNCATION.to_owned(), u });
+        }
+        if self.extrapolation.is_some() {
+            let u = functional.unmeasured_variance().sqrt();
+            budget.push(Contribution { name: EXTRAPOLATION.to_owned(), u });
         }
         let commons = budget.len();
         for (name, shift) in self.common_shifts(functional) {
@@ -472,18 +474,3 @@ impl Fit {
         (0..dense).map(|j| &self.parts.factor[j * (j + 1) / 2..][..=j])
     }
 }
-
-impl Estimate {
-    pub(crate) fn times(self, factor: f64) -> Self {
-        Self {
-            value: self.value * factor,
-            u: self.u * factor.abs(),
-            u_independent: self.u_independent * factor.abs(),
-        }
-    }
-}
-
-/// The name of what the functions can't follow among contributions.
-pub const TRUNCATION: &str = "truncation";
-/// The budget's name for what is independent from reading to reading.
-const INDEPENDENT: &str = "independent";

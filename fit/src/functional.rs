@@ -14,6 +14,9 @@ pub struct Functional {
     beyond: Vec<f64>,
     /// The one direction that it is a sum over, if there is one.
     along: Option<Along>,
+    /// What is not known of it where nothing was measured: one u of an independent component each.
+    /// Empty where that is not known.
+    unmeasured: Vec<f64>,
 }
 
 /// A direction, and the sum of the weights of rays along it.
@@ -26,7 +29,22 @@ pub(crate) struct Along {
 
 impl Functional {
     pub(crate) fn new(row: Vec<f64>, beyond: Vec<f64>) -> Self {
-        Self { row, beyond, along: None }
+        Self { row, beyond, along: None, unmeasured: Vec::new() }
+    }
+
+    /// The same, with what is not known of it where nothing was measured.
+    pub(crate) fn with_unmeasured(self, unmeasured: Vec<f64>) -> Self {
+        Self { unmeasured, ..self }
+    }
+
+    /// See [`with_unmeasured`](Self::with_unmeasured).
+    pub(crate) fn unmeasured(&self) -> &[f64] {
+        &self.unmeasured
+    }
+
+    /// The variance by all of these.
+    pub(crate) fn unmeasured_variance(&self) -> f64 {
+        dot(&self.unmeasured, &self.unmeasured)
     }
 
     /// The same, of one direction alone.
@@ -61,7 +79,8 @@ impl Functional {
     /// The functional times a number: a unit, an area, a share.
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
-        self.row.iter_mut().chain(&mut self.beyond).for_each(|element| *element *= factor);
+        let rows = self.row.iter_mut().chain(&mut self.beyond).chain(&mut self.unmeasured);
+        rows.for_each(|element| *element *= factor);
         if let Some(along) = &mut self.along {
             along.weight *= factor;
         }
@@ -86,6 +105,8 @@ impl Functional {
     pub fn add(&mut self, factor: f64, other: &Self) {
         assert_eq!(self.row.len(), other.row.len(), "functionals of different fits");
         assert_eq!(self.beyond.len(), other.beyond.len(), "functionals of different fits");
+        let (own, others) = (self.unmeasured.len(), other.unmeasured.len());
+        assert_eq!(own, others, "functionals of different fits");
         let added = other.along.map(|along| Along { weight: factor * along.weight, ..along });
         self.along = match (self.is_nothing(), other.is_nothing()) {
             (_, true) => self.along,
@@ -94,6 +115,7 @@ impl Functional {
         };
         self.row.iter_mut().zip(&other.row).for_each(|(a, b)| *a += factor * b);
         self.beyond.iter_mut().zip(&other.beyond).for_each(|(a, b)| *a += factor * b);
+        self.unmeasured.iter_mut().zip(&other.unmeasured).for_each(|(a, b)| *a += factor * b);
     }
 }
 
@@ -164,6 +186,7 @@ impl Fit {
         let first = rays.first().map(along);
         let one = first.and_then(|first| rays[1..].iter().map(along).try_fold(first, Along::and));
         let sum = self.functional(|basis| sum_over(basis, &rays));
+        let sum = sum.with_unmeasured(self.unmeasured_along(&rays));
         match one {
             Some(along) => sum.towards(along),
             None => sum,
@@ -174,13 +197,14 @@ impl Fit {
     /// area and cos θ it is the intensity.
     pub fn mean_towards(&self, theta_rad: f64, phi_rad: f64) -> Functional {
         let mean = self.functional(|basis| basis.mean_over_region(theta_rad, phi_rad));
-        mean.towards(Along { theta_rad, phi_rad, weight: 1.0 })
+        let unmeasured = self.unmeasured_towards(&[(theta_rad, phi_rad, 1.0)]);
+        mean.with_unmeasured(unmeasured).towards(Along { theta_rad, phi_rad, weight: 1.0 })
     }
 
     /// The flux in all directions of the chart, as a functional: from the region, through both
     /// rectangles of two planes.
     pub(crate) fn throughput_sum(&self) -> Functional {
-        self.functional(|basis| basis.exitance().to_vec()).times(self.region().area_m2())
+        self.exitance_sum().times(self.region().area_m2())
     }
 
     /// The functional's value with its uncertainty, in the values' unit times the weights'.

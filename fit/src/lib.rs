@@ -47,11 +47,12 @@ pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
 pub use chart::{Chart, Face};
 pub use choice::{
-    AngularKind, Candidate, Choice, Gleaning, Spans, SweepKind, Wish, WishClash, choose,
+    AngularKind, Candidate, Choice, Chosen, Gleaning, Spans, SweepKind, Wish, WishClash, choose,
 };
 pub use coverage::Coverage;
 pub use error::FitError;
-pub use fitted::{Contribution, Estimate, Fit, TRUNCATION};
+pub use estimate::{Contribution, EXTRAPOLATION, Estimate, TRUNCATION};
+pub use fitted::Fit;
 pub use functional::Functional;
 pub use influence::Influence;
 pub use nonnegative::Nonnegative;
@@ -79,7 +80,9 @@ mod choice;
 mod coverage;
 pub mod derive;
 mod error;
+mod estimate;
 mod excess;
+mod extrapolation;
 mod fitted;
 mod functional;
 mod grid;

@@ -1,7 +1,7 @@
 //! From readings to the field by rules that a person set: basis chosen, weights settled, symmetry tested,
 //! darkness kept from being darker. The one way that runs and files go.
 
-use crate::choice::{Choice, Wish, choose};
+use crate::choice::{Choice, Chosen, Wish, choose};
 use crate::solve::check_readings;
 use crate::{
     Fit, FitError, Nonnegative, Optics, Penalised, Readings, Region, Robust, Sample, Symmetry,
@@ -40,7 +40,8 @@ pub struct Ruled {
 }
 
 /// The fit of readings in the basis that the wish pins or that they ask for, by its rules, with what
-/// its functions can't follow in every u ([`Fit::with_truncation`]). Limits have no part in the choice
+/// its functions can't follow in every u ([`Fit::with_truncation`]), and what other functions that do about as
+/// well make of where nothing was measured. Limits have no part in the choice
 /// of the basis; nor have, once they are known, readings that lost nearly all their weight.
 pub fn fit_wished(
     readings: &Readings<'_>,
@@ -49,7 +50,9 @@ pub fn fit_wished(
     optics: Option<&Optics>,
 ) -> Result<Ruled, FitError> {
     let (fit, choice) = fit_chosen(readings, region, wish, optics)?;
-    Ok(Ruled { choice, ..fit.truncated(readings, &wish.rules, optics)? })
+    let chosen = choice.as_ref().and_then(Choice::chosen);
+    let others = chosen.map_or(Vec::new(), |chosen| chosen.others);
+    Ok(Ruled { choice, ..fit.doubted(readings, &others, &wish.rules, optics)? })
 }
 
 /// The same without what its functions can't follow in u: where the field's values are asked for alone,
@@ -64,16 +67,17 @@ pub fn fit_valued(
     Ok(Ruled { choice, ..fit.ruled(&wish.rules)? })
 }
 
-/// As [`fit_wished`] in a basis that is known.
+/// As [`fit_wished`] in a basis that is known, or was chosen from readings before.
 pub fn fit_known(
     readings: &Readings<'_>,
     region: &Region,
-    model: Penalised,
+    chosen: &Chosen,
     rules: &Rules,
     optics: Option<&Optics>,
 ) -> Result<Ruled, FitError> {
     let of_rules = Readings { robust: rules.robust, ..*readings };
-    crate::fit_readings(&of_rules, region, model, optics)?.truncated(readings, rules, optics)
+    let fit = crate::fit_readings(&of_rules, region, chosen.model, optics)?;
+    fit.doubted(readings, &chosen.others, rules, optics)
 }
 
 fn fit_chosen(
@@ -120,16 +124,20 @@ pub fn fit_ruled(
 }
 
 impl Fit {
-    /// By the rules, with what its functions can't follow. Before what the rules do to the field: only
-    /// of the fit itself it is known what readings did to it.
-    fn truncated(
+    /// By the rules, with what its functions can't follow, and what others make of where nothing was
+    /// measured. Before what the rules do to the field: only of the fit itself it is known what readings
+    /// did to it.
+    fn doubted(
         self,
         readings: &Readings<'_>,
+        others: &[Penalised],
         rules: &Rules,
         optics: Option<&Optics>,
     ) -> Result<Ruled, FitError> {
         let Readings { samples, flown, common, .. } = *readings;
-        self.with_truncation(samples, flown, common, optics)?.ruled(rules)
+        let of_rules = Readings { robust: rules.robust, ..*readings };
+        let fit = self.with_truncation(samples, flown, common, optics)?;
+        fit.with_extrapolation(others, &of_rules, optics).ruled(rules)
     }
 
     /// The field with the symmetry asked for, if the readings bear it, and above zero.

@@ -2,6 +2,8 @@
 //! `[stop]`: the rule that ends a run once it is met, what is said while the run goes on, and of a run
 //! that missed it.
 
+use fit::{Choice, Chosen, Fit, Ruled};
+
 use super::acquire::Pace;
 use super::failure::Failure;
 use super::results::{Results, fit_region, optics, targets_planned};
@@ -47,7 +49,7 @@ struct Target {
     region: fit::Region,
     wish: fit::Wish,
     /// What the wish leaves open, as it was chosen last, and at how many targets.
-    chosen: Option<(fit::Penalised, usize)>,
+    chosen: Option<(Chosen, usize)>,
     optics: Option<fit::Optics>,
     /// The plan's target, if it has one.
     asked: Option<f64>,
@@ -66,7 +68,7 @@ impl Target {
             rig: setup.rig.clone(),
             region: fit_region(setup),
             wish,
-            chosen: wish.decided().map(|model| (model, usize::MAX)),
+            chosen: wish.decided().map(|model| (model.into(), usize::MAX)),
             optics: optics(setup),
             asked,
             planned: targets_planned(setup),
@@ -89,8 +91,13 @@ impl Target {
 
     fn so_far(&mut self, rig_s: f64) -> Option<Said> {
         let calibrated = calibrate(&self.rig, &self.readings).ok()?;
-        let trend = Trend::of_exitance(rig_s, &self.fitted(&calibrated)?.fit)?;
+        let mut trend = Trend::of_exitance(rig_s, &self.fitted(&calibrated)?)?;
         let Self { asked, targets, planned, .. } = *self;
+        // What the functions can't follow, and what others make of where nothing was measured, takes a
+        // pass more: it has the last word.
+        if asked.is_some_and(|asked| trend.u() <= asked) {
+            trend = Trend::of_exitance(rig_s, &self.doubted(&calibrated)?)?;
+        }
         Some(match asked {
             Some(asked) if trend.u() <= asked => Said::Enough(format!(
                 "exitance to {} after {targets} of {planned} targets",
@@ -142,18 +149,25 @@ pub(crate) fn as_json(trend: &Trend, setup: &Setup) -> serde_json::Value {
 
 impl Target {
     /// In the basis chosen last; it is chosen anew whenever there are twice as many targets.
-    fn fitted(&mut self, calibrated: &Calibrated) -> Option<Fitted> {
+    fn fitted(&mut self, calibrated: &Calibrated) -> Option<Fit> {
         let optics = self.optics.as_ref();
-        match self.chosen {
-            Some((model, at)) if self.targets / 2 < at => {
-                calibrated.fit_as(&self.region, model, &self.wish.rules, optics).ok()
-            }
-            _ => {
-                let fitted = calibrated.fit(&self.region, &self.wish, optics).ok()?;
-                self.chosen = Some((fitted.fit.model(), self.targets));
-                Some(fitted)
-            }
+        if let Some((chosen, at)) = &self.chosen
+            && self.targets / 2 < *at
+        {
+            let rules = &self.wish.rules;
+            return Some(calibrated.fit_as(&self.region, chosen.model, rules, optics).ok()?.fit);
         }
+        let Ruled { fit, choice, .. } =
+            calibrated.fit_valued(&self.region, &self.wish, optics).ok()?;
+        let chosen = choice.as_ref().and_then(Choice::chosen);
+        self.chosen = Some((chosen.unwrap_or_else(|| fit.model().into()), self.targets));
+        Some(fit)
+    }
+
+    /// The fit in the same basis with all that is not known of it.
+    fn doubted(&self, calibrated: &Calibrated) -> Option<Fit> {
+        let (chosen, _) = self.chosen.as_ref()?;
+        calibrated.fit_known(&self.region, chosen, &self.wish.rules, self.optics.as_ref()).ok()
     }
 }
 

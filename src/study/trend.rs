@@ -35,15 +35,16 @@ impl Trend {
     /// Of a fit's exitance.
     pub fn of_exitance(rig_s: f64, fit: &fit::Fit) -> Option<Self> {
         let rows = fit.contributions();
-        let truncation =
-            rows.iter().find(|row| row.name == fit::TRUNCATION).map_or(0.0, |row| row.u);
-        Self::beside(rig_s, &fit.exitance(), truncation)
+        let lasts = |name: &str| name == fit::TRUNCATION || name == fit::EXTRAPOLATION;
+        let lasting = rows.iter().filter(|row| lasts(&row.name)).map(|row| row.u);
+        Self::beside(rig_s, &fit.exitance(), lasting.fold(0.0, libm::hypot))
     }
 
-    fn beside(rig_s: f64, estimate: &fit::Estimate, truncation: f64) -> Option<Self> {
+    /// With a part of the independent u that more readings do not lessen.
+    fn beside(rig_s: f64, estimate: &fit::Estimate, lasting: f64) -> Option<Self> {
         let fit::Estimate { value, u, u_independent } = *estimate;
         let rest = |whole: f64, part: f64| libm::sqrt((whole * whole - part * part).max(0.0));
-        let independent = rest(u_independent, truncation);
+        let independent = rest(u_independent, lasting);
         (value > 0.0).then(|| Self {
             rig_s,
             lasting: rest(u, independent) / value,

@@ -43,6 +43,22 @@ pub struct Choice {
     pub candidates: Vec<Candidate>,
 }
 
+/// A model that readings chose, and others that did about as well among them: beyond the readings they may go
+/// on otherwise. A pinned model has none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    /// What was chosen.
+    pub model: Penalised,
+    /// What did about as well.
+    pub others: Vec<Penalised>,
+}
+
+impl From<Penalised> for Chosen {
+    fn from(model: Penalised) -> Self {
+        Self { model, others: Vec::new() }
+    }
+}
+
 /// A basis that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {

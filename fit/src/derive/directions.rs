@@ -77,6 +77,23 @@ impl Zone {
         directions
     }
 
+    /// (θ, φ, weight) by one of the two rules.
+    pub(crate) fn weighted(
+        self,
+        is_whole: bool,
+        rings: usize,
+        spokes: usize,
+    ) -> Vec<(f64, f64, f64)> {
+        let directions = if is_whole {
+            self.all_directions(rings, spokes)
+        } else {
+            self.directions(rings, spokes)
+        };
+        let of =
+            |direction: Direction| (direction.theta_rad, direction.phi_rad, direction.weight_sr);
+        directions.into_iter().map(of).collect()
+    }
+
     /// The same by solid angle: Gauss-Legendre in cos θ times equidistant azimuths.
     pub(super) fn all_directions(self, rings: usize, spokes: usize) -> Vec<Direction> {
         let (low, high) = (libm::cos(self.to_rad), libm::cos(self.from_rad));

@@ -12,12 +12,13 @@
 //! local perturbations"), and so is what is known beforehand of what was fitted along. What a
 //! component does to the coefficients is linear, as in the fit's own u. What the functions can't
 //! follow ([`Truncation`]) is a draw for each field missed, as much larger along a ray as the field is
-//! rougher there.
+//! rougher there; and one for each component of what is not known where nothing was measured.
 //!
 //! This room rolls no dice: normal deviates are handed in.
 
 mod spread;
 
+use crate::basis::dot;
 use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::nuisance::Solved;
@@ -55,6 +56,8 @@ pub struct Trial<'t> {
     missed: &'t [f64],
     /// What is finer than all functions, along a ray.
     finer: f64,
+    /// How much of each component of what is not known where nothing was measured.
+    unmeasured: &'t [f64],
 }
 
 /// Where a trial's field is largest.
@@ -104,7 +107,8 @@ impl Fit {
 
     /// The mean exitance as a functional: of what [`Fit::exitance`] is the value.
     pub fn exitance_sum(&self) -> Functional {
-        self.functional(|basis| basis.exitance().to_vec())
+        let all = self.functional(|basis| basis.exitance().to_vec());
+        all.with_unmeasured(self.unmeasured())
     }
 
     /// The flux as a functional: of what [`Fit::flux`] is the value.
@@ -125,6 +129,7 @@ impl Trials<'_> {
         let p = self.fit.coefficients().len();
         let whole = p + self.missed().map_or(0, |missed| missed.first().map_or(0, Vec::len) - p);
         let most = (NUMBERS_MAX / (2 * whole + self.columns.len())).clamp(1, BLOCK_MAX);
+        let components = self.fit.weighted_rays([]).unmeasured().len();
         let mut left = count;
         while left > 0 {
             let block = left.min(most);
@@ -133,7 +138,9 @@ impl Trials<'_> {
                 let finer = self.fit.parts().model.truncation;
                 let finer = if finer > 0.0 { finer * normal() } else { 0.0 };
                 let missed = missed.as_ref().map_or(&[][..], |missed| missed.col_as_slice(t));
-                each(&Trial { trials: self, field: fields.col_as_slice(t), missed, finer });
+                let unmeasured: Vec<f64> = (0..components).map(|_| normal()).collect();
+                let (trials, field) = (self, fields.col_as_slice(t));
+                each(&Trial { trials, field, missed, finer, unmeasured: &unmeasured });
             }
             left -= block;
         }
@@ -225,7 +232,9 @@ impl Trial<'_> {
             self.coefficients().len(),
             "a functional of another fit"
         );
-        functional.times_field(self.field) + self.along_one(functional)
+        functional.times_field(self.field)
+            + self.along_one(functional)
+            + dot(functional.unmeasured(), self.unmeasured)
     }
 
     /// What is in a functional of one direction alone beside the field: what is finer than all

@@ -1,8 +1,8 @@
 //! The field that a run's samples show: the fit of all of them, or of those taken first.
 
 use fit::{
-    Choice, Fit, FitError, Nonnegative, Optics, Penalised, Ray, Region, Resolves, Ruled, Rules,
-    SymmetryError, SymmetryTest, Wish,
+    Choice, Chosen, Fit, FitError, Nonnegative, Optics, Penalised, Ray, Region, Resolves, Ruled,
+    Rules, SymmetryError, SymmetryTest, Wish,
 };
 
 use fit::trials::Trials;
@@ -55,25 +55,25 @@ impl Calibrated {
         region: &Region,
         wish: &Wish,
         optics: Option<&Optics>,
-    ) -> Result<Fit, FitError> {
+    ) -> Result<Ruled, FitError> {
         let input = self.fit_input(&wish.rules);
         demand_drift(input.drift.as_ref(), &wish.rules)?;
         let flown = self.flown(&input);
-        Ok(fit::fit_valued(&input.readings(&flown), region, wish, optics)?.fit)
+        fit::fit_valued(&input.readings(&flown), region, wish, optics)
     }
 
-    /// As [`fit`](Self::fit) with a basis and a penalty that are known.
+    /// As [`fit`](Self::fit) with a basis and a penalty that are known, or were chosen before.
     pub fn fit_known(
         &self,
         region: &Region,
-        model: Penalised,
+        chosen: &Chosen,
         rules: &Rules,
         optics: Option<&Optics>,
     ) -> Result<Fit, FitError> {
         let input = self.fit_input(rules);
         demand_drift(input.drift.as_ref(), rules)?;
         let flown = self.flown(&input);
-        Ok(fit::fit_known(&input.readings(&flown), region, model, rules, optics)?.fit)
+        Ok(fit::fit_known(&input.readings(&flown), region, chosen, rules, optics)?.fit)
     }
 
     /// Hands over trials of the readings that a fit was made of, by the rules and the optics that it

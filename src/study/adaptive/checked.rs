@@ -1,6 +1,6 @@
 //! What sweeps say of a fit that has not seen them.
 
-use fit::{Fit, Optics, Penalised};
+use fit::{Choice, Chosen, Fit, Optics, Ruled};
 
 use super::Terms;
 use super::scans::Scan;
@@ -12,10 +12,10 @@ pub(super) const CHECKS_MIN: usize = 4;
 const Z_90: f64 = 1.281_551_565_544_600_4;
 
 /// An error estimated from checks, relative to the radiance's root mean square.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Checked {
     /// The basis that the other sweeps asked for.
-    pub(super) model: Penalised,
+    pub(super) chosen: Chosen,
     pub(super) relative: f64,
     /// What it is below with a confidence of 90 %, by the scatter among the checks.
     pub(super) upper_relative: f64,
@@ -40,7 +40,8 @@ pub(super) fn checked(
     let seen: Vec<Sample> =
         samples.filter(|(place, _)| !is_held(*place)).map(|(_, sample)| sample.clone()).collect();
     let rest = Calibrated { samples: seen, ..calibrated.clone() };
-    let fit = rest.fit_valued(&terms.region, &terms.plan.fit, terms.optics.as_ref())?;
+    let ruled = rest.fit_valued(&terms.region, &terms.plan.fit, terms.optics.as_ref())?;
+    let Ruled { fit, choice, .. } = ruled;
     let squares: Vec<f64> = checks
         .iter()
         .filter_map(|scan| mean_square_error(&fit, terms.optics.as_ref(), calibrated, scan))
@@ -51,7 +52,9 @@ pub(super) fn checked(
     let (mean, upper) = mean_and_upper(&squares);
     let relative = |square: f64| libm::sqrt(square.max(0.0) / mean_square);
     let (relative, upper_relative) = (relative(mean), relative(upper));
-    Ok(Some(Checked { model: fit.model(), relative, upper_relative }))
+    let chosen = choice.as_ref().and_then(Choice::chosen);
+    let chosen = chosen.unwrap_or_else(|| fit.model().into());
+    Ok(Some(Checked { chosen, relative, upper_relative }))
 }
 
 /// Of a sweep, weighted with throughput, its readings' own noise taken out.

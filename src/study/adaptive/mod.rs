@@ -272,13 +272,13 @@ impl State<'_> {
     /// What the checks, and the exitance's own uncertainty, say of a fit.
     fn ask_fit(&mut self, account: &mut Account) {
         self.is_asked = true;
-        let mut model = None;
+        let mut known = None;
         if self.terms.adaptive.radiance_relative.is_some() {
             let mean_square = self.between.mean_square();
             // A fit that is refused says nothing yet; more sweeps determine it.
             let found = checked(self.terms, self.calibrated, self.scans, mean_square);
-            if let Ok(Some(Checked { model: chosen, relative, upper_relative })) = found {
-                model = Some(chosen);
+            if let Ok(Some(Checked { chosen, relative, upper_relative })) = found {
+                known = Some(chosen);
                 account.checked_relative = Some(relative);
                 account.checked_upper_relative = Some(upper_relative);
             }
@@ -287,8 +287,8 @@ impl State<'_> {
             let Terms { plan, region, optics, .. } = self.terms;
             let optics = optics.as_ref();
             // The basis that all but the checks ask for is the one of all: choosing it takes longest.
-            let whole = match model {
-                Some(model) => self.calibrated.fit_known(region, model, &plan.fit.rules, optics),
+            let whole = match &known {
+                Some(known) => self.calibrated.fit_known(region, known, &plan.fit.rules, optics),
                 None => self.calibrated.fit(region, &plan.fit, optics).map(|fitted| fitted.fit),
             };
             self.whole = whole.ok();

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use fit::{Estimate, Fit, TRUNCATION};
+use fit::{EXTRAPOLATION, Estimate, Fit, TRUNCATION};
 use serde::{Deserialize, Serialize};
 
 use super::{Account, State, dark};
@@ -125,7 +125,9 @@ impl State<'_> {
         let mut parts = fit.contributions().split_off(1);
         let dark = dark::known(self.calibrated);
         let lessens = dark.is_some_and(|dark| dark::is_noise(self.terms, dark));
-        let is_shared = |name: &str| name != TRUNCATION && !(lessens && name.starts_with(DARK));
+        // More sweeps lessen these.
+        let is_less = |name: &str| [TRUNCATION, EXTRAPOLATION].contains(&name);
+        let is_shared = |name: &str| !(is_less(name) || lessens && name.starts_with(DARK));
         parts.retain(|part| is_shared(&part.name));
         let square: f64 = parts.iter().map(|part| part.u * part.u).sum();
         let largest = parts.iter().max_by(|a, b| a.u.total_cmp(&b.u))?;
