@@ -18,16 +18,32 @@ pub(crate) struct Grid {
 impl Grid {
     pub(crate) fn of(samples: &[Sample], region: &Region) -> Self {
         let rays = || samples.iter().map(|s| s.ray);
-        let position_apart_m = POSITION_APART * region.margin_m();
         let theta_max = rays().map(|ray| ray.theta_rad).fold(0.0, f64::max);
-        let off_pole = (OFF_POLE_SHARE * theta_max).clamp(ANGLE_APART_RAD, OFF_POLE_RAD);
-        // Over the whole sphere there is a pole below, too.
-        let lines = rays().filter(|ray| ray.theta_rad.min(PI - ray.theta_rad) > off_pole);
+        let off_pole = off_pole_rad(theta_max);
+        let lines = rays().filter(|ray| pole_distance_rad(ray) > off_pole);
+        Self::of_values(
+            rays().map(|ray| ray.x_m).collect(),
+            rays().map(|ray| ray.y_m).collect(),
+            rays().map(|ray| ray.theta_rad).collect(),
+            lines.map(|ray| azimuth_line(ray.phi_rad)).collect(),
+            region,
+        )
+    }
+
+    /// Of all values that samples have; of azimuth lines those well off the pole.
+    pub(crate) fn of_values(
+        x_m: Vec<f64>,
+        y_m: Vec<f64>,
+        theta_rad: Vec<f64>,
+        azimuth_lines_rad: Vec<f64>,
+        region: &Region,
+    ) -> Self {
+        let position_apart_m = position_apart_m(region);
         Self {
-            x_m: distinct(rays().map(|ray| ray.x_m), position_apart_m),
-            y_m: distinct(rays().map(|ray| ray.y_m), position_apart_m),
-            theta_rad: distinct(rays().map(|ray| ray.theta_rad), ANGLE_APART_RAD),
-            azimuth_lines_rad: distinct(lines.map(|r| azimuth_line(r.phi_rad)), ANGLE_APART_RAD),
+            x_m: distinct(x_m, position_apart_m),
+            y_m: distinct(y_m, position_apart_m),
+            theta_rad: distinct(theta_rad, ANGLE_APART_RAD),
+            azimuth_lines_rad: distinct(azimuth_lines_rad, ANGLE_APART_RAD),
             position_apart_m,
         }
     }
@@ -50,14 +66,29 @@ impl Grid {
     }
 }
 
-fn azimuth_line(phi_rad: f64) -> f64 {
+/// Of a ray the angle to the nearer pole: over the whole sphere there is one below, too.
+pub(crate) fn pole_distance_rad(ray: &Ray) -> f64 {
+    ray.theta_rad.min(PI - ray.theta_rad)
+}
+
+/// Beyond this angle from the pole an azimuth means something, among samples up to `theta_max`.
+pub(crate) fn off_pole_rad(theta_max: f64) -> f64 {
+    (OFF_POLE_SHARE * theta_max).clamp(ANGLE_APART_RAD, OFF_POLE_RAD)
+}
+
+/// Positions closer than this are one.
+pub(crate) fn position_apart_m(region: &Region) -> f64 {
+    POSITION_APART * region.margin_m()
+}
+
+/// The line through the pole that an azimuth lies on, from just below 0 to below π.
+pub(crate) fn azimuth_line(phi_rad: f64) -> f64 {
     let line = phi_rad.rem_euclid(PI);
     if PI - line < ANGLE_APART_RAD { line - PI } else { line }
 }
 
 /// The values without those that lie closer than `apart` above another one.
-fn distinct(values: impl Iterator<Item = f64>, apart: f64) -> Vec<f64> {
-    let mut sorted: Vec<f64> = values.collect();
+fn distinct(mut sorted: Vec<f64>, apart: f64) -> Vec<f64> {
     sorted.sort_by(f64::total_cmp);
     sorted.dedup_by(|value, kept| *value - *kept < apart);
     sorted
@@ -70,7 +101,7 @@ fn nearest(grid: &[f64], value: f64, apart: f64) -> f64 {
 }
 
 /// Angles closer than this (0.06°) are one: readbacks scatter less, and no plan steps so finely.
-const ANGLE_APART_RAD: f64 = 1e-3;
+pub(crate) const ANGLE_APART_RAD: f64 = 1e-3;
 /// Positions closer than this share of the region's margin (0.2 % of its half width) are one.
 const POSITION_APART: f64 = 0.1;
 /// Readings farther off the pole than this (6°) have an azimuth ..

@@ -96,6 +96,7 @@ pub mod partial;
 mod parts;
 mod peak;
 mod penalty;
+mod poses;
 mod predict;
 mod readings;
 pub mod regression;

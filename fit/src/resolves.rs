@@ -3,9 +3,10 @@
 
 use crate::basis::{Angular, BasisSpec, Position};
 use crate::beam::Optics;
-use crate::choice::{SweepKind, Sweeps};
+use crate::choice::SweepKind;
 use crate::grid::Grid;
-use crate::{Chart, Ray, Region, Sample};
+use crate::poses::Poses;
+use crate::{Chart, Region, Sample};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// What keeps a narrower feature from being seen.
@@ -64,9 +65,22 @@ impl Resolves {
         basis: BasisSpec,
         optics: Option<&Optics>,
     ) -> Self {
-        let measured_to_rad = samples.iter().map(|s| s.ray.theta_rad).fold(0.0, f64::max);
-        let grid = Grid::of(samples, region);
-        let (theta_gap, phi_gap) = gaps(samples, region, &grid, measured_to_rad);
+        let poses = Poses::of(samples, region);
+        let mut tally = poses.tally();
+        tally.take(samples);
+        Self::by(&poses, tally.kind(), region, basis, optics)
+    }
+
+    /// For readings of such poses, which come in sweeps of a kind.
+    pub(crate) fn by(
+        poses: &Poses,
+        kind: SweepKind,
+        region: &Region,
+        basis: BasisSpec,
+        optics: Option<&Optics>,
+    ) -> Self {
+        let (grid, measured_to_rad) = (poses.grid(), poses.measured_to_rad());
+        let (theta_gap, phi_gap) = gaps(poses, kind, region, &grid);
         let (theta_basis, phi_basis) = bends(basis.angular, region);
         let (angle, spot) = optics.map_or((0.0, 0.0), |optics| {
             let beam = &optics.beam;
@@ -133,24 +147,15 @@ fn bends(angular: Angular, region: &Region) -> (f64, f64) {
 }
 
 /// Of sweeps the largest steps along and across; of scattered readings the widest hole either way.
-fn gaps(samples: &[Sample], region: &Region, grid: &Grid, theta_to: f64) -> (f64, f64) {
-    let sweeps = Sweeps::of(samples, region);
-    if matches!(sweeps.kind, SweepKind::Theta | SweepKind::Phi) {
+fn gaps(poses: &Poses, kind: SweepKind, region: &Region, grid: &Grid) -> (f64, f64) {
+    let theta_to = poses.measured_to_rad().min(FRAC_PI_2);
+    if matches!(kind, SweepKind::Theta | SweepKind::Phi) {
         let theta = widest(&grid.theta_rad, (0.0, region.theta_max_rad));
         // A line through the normal has readings on both sides or on one.
-        let mut azimuths: Vec<f64> = samples
-            .iter()
-            .filter(|s| libm::sin(s.ray.theta_rad) > libm::sin(0.5 * theta_to.min(FRAC_PI_2)))
-            .map(|s| s.ray.phi_rad.rem_euclid(TAU))
-            .collect();
-        azimuths.sort_by(f64::total_cmp);
-        let around = azimuths.first().map(|first| first + TAU);
-        azimuths.extend(around);
-        let phi = azimuths.windows(2).map(|ends| ends[1] - ends[0]).fold(0.0, f64::max);
-        return (theta, phi);
+        return (theta, poses.widest_turn_rad(0.5 * theta_to));
     }
-    let hole = hole(samples, region);
-    (hole, hole / libm::sin(theta_to.min(FRAC_PI_2)).max(f64::MIN_POSITIVE))
+    let hole = poses.hole_rad();
+    (hole, hole / libm::sin(theta_to).max(f64::MIN_POSITIVE))
 }
 
 /// The widest step between neighbours; from an end to the first of them counts twice.
@@ -160,29 +165,3 @@ fn widest(places: &[f64], (from, to): (f64, f64)) -> f64 {
     let after = places.last().map_or(to - from, |last| to - last);
     between.max(2.0 * before).max(2.0 * after)
 }
-
-/// The diameter of the largest circle of directions within the cone without a reading, to about its
-/// grid of 400.
-fn hole(samples: &[Sample], region: &Region) -> f64 {
-    let unit = |ray: &Ray| radiometry::direction::unit(ray.theta_rad, ray.phi_rad);
-    let every = samples.len().div_ceil(DIRECTIONS_MAX).max(1);
-    let seen: Vec<_> = samples.iter().step_by(every).map(|s| unit(&s.ray)).collect();
-    let cos_min = libm::cos(region.theta_max_rad);
-    let mut widest: f64 = 0.0;
-    for i in 0..PROBES {
-        // Evenly in solid angle, turned on by the golden angle.
-        let t = (f64::from(i) + 0.5) / f64::from(PROBES);
-        let theta = libm::acos(1.0 - t * (1.0 - cos_min));
-        let probe = radiometry::direction::unit(theta, f64::from(i) * GOLDEN_RAD);
-        let nearest = seen.iter().map(|d| d.dot(probe)).fold(-1.0, f64::max);
-        widest = widest.max(libm::acos(nearest.min(1.0)));
-    }
-    2.0 * widest
-}
-
-/// Probes of a hole.
-const PROBES: u32 = 400;
-/// Of more readings every so many-th is looked at.
-const DIRECTIONS_MAX: usize = 20_000;
-/// π(3 - √5).
-const GOLDEN_RAD: f64 = 2.399_963_229_728_653;

@@ -147,7 +147,7 @@ fn fit_long_run(
         fit,
         treatment: &treatment,
         choice: made.ruled.choice.as_ref(),
-        resolves: None,
+        resolves: Some(made.resolves),
         quantity,
         simulated: setup.rig.is_simulated(),
         n_flagged: made.n_flagged,
@@ -292,6 +292,7 @@ fn fit_stream(
     let asked = Asked { region: scan.region, model, robust: wish.rules.robust, optics };
     let us = (args.u_relative, args.u_scale);
     let (blockwise, treated) = scan.fit(&args.source, &asked, us)?;
+    let resolves = Some(blockwise.resolves);
     let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
@@ -307,7 +308,7 @@ fn fit_stream(
         fit: &ruled.fit,
         treatment: &treatment,
         choice: choice.as_ref(),
-        resolves: None,
+        resolves,
         quantity: scan.quantity,
         simulated: false,
         n_flagged: scan.flagged,

@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 
 use fit::blocks::{Asked, Blocks, Blockwise, Totals};
-use fit::{FitError, Gleaning, Optics, Readings, Ruled, Wish};
+use fit::{FitError, Gleaning, Optics, Readings, Resolves, Ruled, Wish};
 
 use super::failure::Failure;
 use super::fit::FIT_HELP;
@@ -23,6 +23,7 @@ use crate::rig::calibration::{
 /// What a run's fit says that was made in blocks.
 pub(super) struct LongFit {
     pub(super) ruled: Ruled,
+    pub(super) resolves: Resolves,
     pub(super) drift: Option<FittedDrift>,
     pub(super) nuisances: Vec<fit::FittedNuisance>,
     pub(super) treated: TreatedReadings,
@@ -60,12 +61,13 @@ pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit
     let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())
         .map_err(|error| refused(&error))?;
     let asked = Asked { region, model, robust: wish.rules.robust, optics: optics.as_ref() };
-    let (Blockwise { fit, nuisances }, closing) = run.fit(&asked)?;
+    let (Blockwise { fit, nuisances, resolves }, closing) = run.fit(&asked)?;
     let ruled = fit.clone().ruled(&wish.rules).map_err(|error| refused(&error))?;
     let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();
     let independent = closing.sums.parts(&ruled.fit);
     Ok(LongFit {
         ruled: Ruled { choice, ..ruled },
+        resolves,
         drift: run.handing.drift.clone(),
         nuisances,
         treated: closing.treated,

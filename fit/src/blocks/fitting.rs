@@ -12,6 +12,7 @@ use crate::influence::{Influence, Watched};
 use crate::nuisance::{Solved, packed, without};
 use crate::parts::{CommonShift, Parts};
 use crate::penalty::Prior;
+use crate::poses::Poses;
 use crate::solve::{
     QualitySums, absorb, begun, check_readings, levels, needs_a_side, sensitivities, shifts,
     solved, weighed_by,
@@ -19,7 +20,7 @@ use crate::solve::{
 use crate::triangle::Triangle;
 use crate::undetermined::by_functions;
 use crate::weights::{PASSES_MAX, REWEIGHING_MAX, SETTLED_RELATIVE, Settled, excess_by, shrink};
-use crate::{Common, FitError, Readings, Robust, Shift};
+use crate::{Common, Fit, FitError, FittedNuisance, Readings, Resolves, Robust, Shift};
 
 /// Fits readings that come in blocks, as [`fit_readings`](crate::fit_readings) does readings that are
 /// there. Of weights that are settled, and of noise that is what it was said to be, it takes three walks; `told`
@@ -31,9 +32,18 @@ pub fn fit<B: Blocks>(
     told: &mut dyn FnMut(&Readings<'_>, &Told),
 ) -> Result<Blockwise, B::Error> {
     let fitting = Fitting::new(totals, *asked)?;
-    let (triangle, shared) = fitting.first(blocks)?;
+    let mut poses = Poses::new(totals.readings, &asked.region);
+    let (triangle, shared) = fitting.first(blocks, &mut poses)?;
     let (triangle, pass) = fitting.settle(blocks, triangle, &shared)?;
-    fitting.close(blocks, triangle, &pass, &shared, told)
+    let mut tally = poses.tally();
+    let (fit, nuisances) =
+        fitting.close(blocks, triangle, &pass, &shared, &mut |block, of_block| {
+            tally.take(block.samples);
+            told(block, of_block);
+        })?;
+    let Asked { region, model, optics, .. } = asked;
+    let resolves = Resolves::by(&poses, tally.kind(), region, model.basis, *optics);
+    Ok(Blockwise { fit, nuisances, resolves })
 }
 
 struct Fitting<'a> {
@@ -99,13 +109,18 @@ impl<'a> Fitting<'a> {
     }
 
     /// The walk that looks whether the readings make sense: its rows are those before anything is fitted.
-    fn first<B: Blocks>(&self, blocks: &mut B) -> Result<(Triangle, Shared), B::Error> {
+    fn first<B: Blocks>(
+        &self,
+        blocks: &mut B,
+        poses: &mut Poses,
+    ) -> Result<(Triangle, Shared), B::Error> {
         let mut begun_at: Option<(Triangle, Shared)> = None;
         self.walk(blocks, |block, design| {
             for (index, sample) in block.samples.iter().enumerate() {
                 check_sample(index, sample, &self.asked.region)?;
             }
             check_block(block)?;
+            poses.take(block.samples);
             let (triangle, shared) = begun_at.get_or_insert_with(|| {
                 let triangle = begun(block.nuisances.len(), self.basis.len(), 0);
                 (triangle, Shared::of(block))
@@ -239,7 +254,7 @@ impl<'a> Fitting<'a> {
         pass: &Pass,
         shared: &Shared,
         told: &mut dyn FnMut(&Readings<'_>, &Told),
-    ) -> Result<Blockwise, B::Error> {
+    ) -> Result<(Fit, Vec<FittedNuisance>), B::Error> {
         let sides = shared.shifting(&shared.common).len();
         if sides > 0 {
             triangle = self.with_sides(blocks, pass, (shared, sides))?;
@@ -273,8 +288,8 @@ impl<'a> Fitting<'a> {
         let whole = packed(&inverse, 1.0);
         let sums = self.tell(blocks, (pass, &solved, &whole), &parts, told)?;
         let quality = sums.quality(condition, determined, pass.excess);
-        let fit = crate::Fit::from_parts(Parts { quality, ..parts });
-        Ok(Blockwise { fit: fit.map_err(|_| FitError::OutOfRange)?, nuisances })
+        let fit = Fit::from_parts(Parts { quality, ..parts });
+        Ok((fit.map_err(|_| FitError::OutOfRange)?, nuisances))
     }
 
     /// The last walk: how good the fit is, and what each reading did.
@@ -285,7 +300,7 @@ impl<'a> Fitting<'a> {
         parts: &Parts,
         told: &mut dyn FnMut(&Readings<'_>, &Told),
     ) -> Result<QualitySums, B::Error> {
-        let fit = crate::Fit::from_parts(parts.clone()).map_err(|_| FitError::OutOfRange)?;
+        let fit = Fit::from_parts(parts.clone()).map_err(|_| FitError::OutOfRange)?;
         let watched = Watched::of(&fit);
         let determined = parts.quality.determined;
         let shrink = shrink(determined, self.known.totals.readings);

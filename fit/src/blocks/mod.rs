@@ -57,8 +57,8 @@
 pub use fitting::fit;
 
 use crate::{
-    Fit, FitError, FittedNuisance, Influence, Noise, Optics, Penalised, Readings, Region, Robust,
-    Weighed,
+    Fit, FitError, FittedNuisance, Influence, Noise, Optics, Penalised, Readings, Region, Resolves,
+    Robust, Weighed,
 };
 
 mod fitting;
@@ -138,6 +138,8 @@ pub struct Blockwise {
     pub fit: Fit,
     /// What was fitted along.
     pub nuisances: Vec<FittedNuisance>,
+    /// The narrowest feature that can be seen.
+    pub resolves: Resolves,
 }
 
 /// What became of a block's readings, of each in its order.

@@ -1,10 +1,10 @@
 //! Blocks against the fit of all readings in memory.
 
 use super::{Asked, Blocks, Blockwise, Totals, fit};
-use crate::scattered::{BASIS, REGION, reading};
+use crate::scattered::{BASIS, REGION, part, reading};
 use crate::{
-    BasisSpec, Common, Fit, FitError, FittedNuisance, Noise, Penalised, Penalty, Ray, Readings,
-    Robust, Sample, Shift, fit_readings,
+    BasisSpec, Common, Fit, FitError, FittedNuisance, Limit, Noise, Penalised, Penalty, Ray,
+    Readings, Resolves, Robust, Sample, Shift, fit_readings,
 };
 
 const READINGS: usize = 2500;
@@ -246,6 +246,33 @@ fn what_readings_share_is_carried_and_fitted_along_as_in_memory() {
         let tolerance = if robust == Robust::None { 1e-6 } else { 3e-4 };
         assert_same(&mut source, BASIS, robust, tolerance);
     }
+}
+
+#[test]
+fn what_can_be_seen_is_what_is_seen_of_all_readings() {
+    let of = |rays: &dyn Fn(usize) -> Ray| {
+        let mut source = Source::new(stated(0.42), false);
+        let each = source.samples.iter_mut().enumerate();
+        each.for_each(|(i, sample)| sample.ray = rays(i));
+        let resolves = in_blocks(&mut source, BASIS.into(), Robust::None).0.resolves;
+        assert_eq!(resolves, Resolves::of(&source.samples, &REGION, BASIS, None));
+        resolves
+    };
+    // 25 meridians at 5 places, whose readbacks scatter, with a gap of 50° among them.
+    let meridians = of(&|i| {
+        let jitter = 2e-5 * (part(i, 0.618_034) - 0.5);
+        let meridian = (i / 20 % 25) as f64;
+        let phi_rad = (13.0 * meridian + if meridian > 11.0 { 37.0 } else { 0.0 }).to_radians();
+        let theta_rad = (3.0 + 4.0 * (i % 20) as f64).to_radians() + jitter;
+        let x_m = -8e-3 + 4e-3 * (i / 500) as f64;
+        Ray { x_m, y_m: 8e-3 - x_m.abs(), theta_rad, phi_rad: phi_rad + jitter }
+    });
+    let phi = meridians.phi_rad.unwrap();
+    assert!((phi.width - 50f64.to_radians()).abs() < 2e-5 && phi.limit == Limit::Sampling);
+    assert!((meridians.measured_to_rad - 79f64.to_radians()).abs() < 2e-5);
+    // Scattered ones: the hole is wider than what the basis bends in.
+    let scattered = of(&|i| Ray { theta_rad: 0.4 * reading(i).0.theta_rad, ..reading(i).0 });
+    assert_eq!(scattered.theta_rad.limit, Limit::Sampling);
 }
 
 #[test]

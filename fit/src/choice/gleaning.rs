@@ -104,7 +104,7 @@ fn key(sample: &Sample) -> [i64; 3] {
 }
 
 /// The finaliser of Steele, Lea and Flood's `SplitMix` (2014) over the three numbers.
-fn hash(key: &[i64; 3]) -> u64 {
+pub(super) fn hash(key: &[i64; 3]) -> u64 {
     key.iter().fold(0, |hash, number| {
         let mixed = (hash ^ number.cast_unsigned()).wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -11,6 +11,7 @@ mod family;
 mod gleaning;
 mod search;
 mod sweeps;
+mod tally;
 mod wish;
 
 use crate::beam::Optics;
@@ -25,6 +26,7 @@ use search::Search;
 pub use gleaning::Gleaning;
 pub use sweeps::SweepKind;
 pub(crate) use sweeps::Sweeps;
+pub(crate) use tally::Tally;
 pub use wish::{AngularKind, Spans, Wish, WishClash};
 
 /// What was chosen, from what.

@@ -53,24 +53,13 @@ impl Sweeps {
     pub(crate) fn of(samples: &[Sample], region: &Region) -> Self {
         let grid = Grid::of(samples, region);
         let rays: Vec<Ray> = samples.iter().map(|s| grid.snap(&s.ray)).collect();
-        let line = |ray: &Ray| key(ray.phi_rad.rem_euclid(core::f64::consts::PI));
-        let (x, y) = (|ray: &Ray| key(ray.x_m * 1e2), |ray: &Ray| key(ray.y_m * 1e2));
-        let theta = |ray: &Ray| key(ray.theta_rad);
-        let turn = |ray: &Ray| key(ray.phi_rad.rem_euclid(core::f64::consts::TAU));
-        let tries: [(SweepKind, Keys<'_>); 3] = [
-            (SweepKind::Theta, &|ray| [line(ray), x(ray), y(ray)]),
-            (SweepKind::Phi, &|ray| [theta(ray), x(ray), y(ray)]),
-            (SweepKind::Place, &|ray| [theta(ray), turn(ray), 0]),
-        ];
-        for (kind, key) in tries {
+        for (kind, key) in KINDS {
             let (members, mut lines) = by_key(&rays, key);
             if kind == SweepKind::Place {
                 // One direction each.
                 lines = numbered(members.len());
             }
-            let long = members.iter().filter(|sweep| sweep.len() >= LENGTH_MIN);
-            let held: usize = long.clone().map(Vec::len).sum();
-            if long.count() >= SWEEPS_MIN && held as f64 >= HELD_MIN * rays.len() as f64 {
+            if are_sweeps(members.iter().map(Vec::len)) {
                 return Self { kind, members, lines };
             }
         }
@@ -135,12 +124,37 @@ fn key(value: f64) -> i64 {
     libm::round(value * KEYS_PER_UNIT) as i64
 }
 
-/// What rays of one sweep share.
-type Keys<'k> = &'k dyn Fn(&Ray) -> [i64; 3];
+/// What rays of one sweep share, once they lie on the grid.
+pub(super) type Keys = fn(&Ray) -> [i64; 3];
+
+/// Kinds of sweeps in the order in which they are looked for.
+pub(super) const KINDS: [(SweepKind, Keys); 3] = [
+    (SweepKind::Theta, |ray| {
+        let line = key(ray.phi_rad.rem_euclid(core::f64::consts::PI));
+        [line, key(ray.x_m * 1e2), key(ray.y_m * 1e2)]
+    }),
+    (SweepKind::Phi, |ray| [key(ray.theta_rad), key(ray.x_m * 1e2), key(ray.y_m * 1e2)]),
+    (SweepKind::Place, |ray| {
+        [key(ray.theta_rad), key(ray.phi_rad.rem_euclid(core::f64::consts::TAU)), 0]
+    }),
+];
+
+/// Whether readings that share a key, this many each, are sweeps: enough long ones that hold nearly all.
+pub(super) fn are_sweeps(lengths: impl Iterator<Item = usize>) -> bool {
+    let (mut long, mut held, mut all) = (0, 0, 0);
+    for length in lengths {
+        all += length;
+        if length >= LENGTH_MIN {
+            long += 1;
+            held += length;
+        }
+    }
+    long >= SWEEPS_MIN && held as f64 >= HELD_MIN * all as f64
+}
 
 /// What shares a key, and which line of directions that is: the key's first number of sweeps, which
 /// stand in its order.
-fn by_key(rays: &[Ray], key: Keys<'_>) -> (Vec<Vec<usize>>, Vec<i64>) {
+fn by_key(rays: &[Ray], key: Keys) -> (Vec<Vec<usize>>, Vec<i64>) {
     let mut members = std::collections::BTreeMap::<[i64; 3], Vec<usize>>::new();
     for (i, ray) in rays.iter().enumerate() {
         members.entry(key(ray)).or_default().push(i);
