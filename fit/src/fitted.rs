@@ -425,8 +425,9 @@ impl Fit {
             let u = missed.sqrt();
             budget.push(Contribution { name: TRUNCATION.to_owned(), u });
         }
-        if self.extrapolation.is_some() {
-            let u = functional.unmeasured_variance().sqrt();
+        let unmeasured = functional.unmeasured_variance();
+        if unmeasured > 0.0 {
+            let u = unmeasured.sqrt();
             budget.push(Contribution { name: EXTRAPOLATION.to_owned(), u });
         }
         let commons = budget.len();
