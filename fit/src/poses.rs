@@ -106,6 +106,12 @@ impl Poses {
         )
     }
 
+    /// Distinct positions along the axis that has more of them.
+    pub(crate) fn places(&self) -> usize {
+        let grid = self.grid();
+        grid.x_m.len().max(grid.y_m.len())
+    }
+
     /// What tells how readings belong together, to be handed all of them once more.
     pub(crate) fn tally(&self) -> Tally {
         Tally::new(self.grid())

@@ -142,7 +142,7 @@ fn fit_long_run(
     let treatment = Treatment::of_readings(wish.rules.robust, made.treated, &made.nuisances)
         .with_rules(made.ruled.symmetry.as_ref(), made.ruled.nonnegative.as_ref())
         .with_drift(made.drift.as_ref());
-    let notes = [IN_BLOCKS.to_owned(), truncation_note(made.ruled.choice.is_some()).to_owned()];
+    let notes = [IN_BLOCKS.to_owned()];
     let file = FitFile {
         fit,
         treatment: &treatment,
@@ -289,18 +289,15 @@ fn fit_stream(
 ) -> Outcome {
     let optics = optics.as_ref();
     let (model, choice) = scan.model(&args.source, (wish, optics), args.u_relative)?;
-    let asked = Asked { region: scan.region, model, robust: wish.rules.robust, optics };
+    let robust = wish.rules.robust;
+    let asked = Asked { region: scan.region, model, robust, optics, with_truncation: true };
     let us = (args.u_relative, args.u_scale);
     let (blockwise, treated) = scan.fit(&args.source, &asked, us)?;
     let resolves = Some(blockwise.resolves);
     let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
-    let notes = [
-        note_on_u(scan.has_u, args.u_relative),
-        IN_BLOCKS.to_owned(),
-        truncation_note(choice.is_some()).to_owned(),
-    ];
+    let notes = [note_on_u(scan.has_u, args.u_relative), IN_BLOCKS.to_owned()];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment = Treatment::of_readings(wish.rules.robust, treated, &[])
         .with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());
@@ -343,16 +340,6 @@ fn write_fit(path: &Path, file: &FitFile<'_>) -> Result<(), Failure> {
         .map_err(Failure::midway)?;
     }
     Ok(())
-}
-
-/// What is said of truncation where no sample is kept.
-fn truncation_note(is_chosen: bool) -> &'static str {
-    if is_chosen {
-        "u of the radiance alone has a part for what the basis can't follow (truncation), by the choice: \
-         that of integrals takes all samples at once"
-    } else {
-        "u has no part for what the basis can't follow (truncation): that takes all samples at once"
-    }
 }
 
 fn note_on_u(has_u: bool, u_relative: Option<f64>) -> String {

@@ -60,7 +60,8 @@ pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit
     let samples = run.gleaning.clone().into_samples();
     let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())
         .map_err(|error| refused(&error))?;
-    let asked = Asked { region, model, robust: wish.rules.robust, optics: optics.as_ref() };
+    let robust = wish.rules.robust;
+    let asked = Asked { region, model, robust, optics: optics.as_ref(), with_truncation: true };
     let (Blockwise { fit, nuisances, resolves }, closing) = run.fit(&asked)?;
     let ruled = fit.clone().ruled(&wish.rules).map_err(|error| refused(&error))?;
     let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();

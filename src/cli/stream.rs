@@ -137,6 +137,7 @@ impl Scan {
                 model: fit::BasisSpec::zernike(0, 0).into(),
                 robust: Robust::None,
                 optics: None,
+                with_truncation: false,
             };
             let by_line =
                 error.index().and_then(|_| self.fit(path, &asked, (u_relative, None)).err());

@@ -18,6 +18,7 @@ use crate::solve::{
     solved, weighed_by,
 };
 use crate::triangle::Triangle;
+use crate::truncation::Widened;
 use crate::undetermined::by_functions;
 use crate::weights::{PASSES_MAX, REWEIGHING_MAX, SETTLED_RELATIVE, Settled, excess_by, shrink};
 use crate::{Common, Fit, FitError, FittedNuisance, Readings, Resolves, Robust, Shift};
@@ -37,7 +38,7 @@ pub fn fit<B: Blocks>(
     let (triangle, pass) = fitting.settle(blocks, triangle, &shared)?;
     let mut tally = poses.tally();
     let (fit, nuisances) =
-        fitting.close(blocks, triangle, &pass, &shared, &mut |block, of_block| {
+        fitting.close(blocks, triangle, &pass, (&shared, &poses), &mut |block, of_block| {
             tally.take(block.samples);
             told(block, of_block);
         })?;
@@ -46,21 +47,21 @@ pub fn fit<B: Blocks>(
     Ok(Blockwise { fit, nuisances, resolves })
 }
 
-struct Fitting<'a> {
-    asked: Asked<'a>,
+pub(super) struct Fitting<'a> {
+    pub(super) asked: Asked<'a>,
     basis: Basis,
     prior: Prior,
-    known: Known,
+    pub(super) known: Known,
 }
 
 /// What all blocks share.
-struct Shared {
+pub(super) struct Shared {
     /// The components, without what they do to single readings.
-    common: Vec<Common>,
-    nuisances: Vec<Common>,
+    pub(super) common: Vec<Common>,
+    pub(super) nuisances: Vec<Common>,
     has_jitter: bool,
     /// Whether an offset is a constant field.
-    holds_constant: bool,
+    pub(super) holds_constant: bool,
 }
 
 impl<'a> Fitting<'a> {
@@ -91,7 +92,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// A walk.
-    fn walk<B: Blocks>(
+    pub(super) fn walk<B: Blocks>(
         &self,
         blocks: &mut B,
         mut each: impl FnMut(&Readings<'_>, &Design<'_>) -> Result<(), FitError>,
@@ -252,7 +253,7 @@ impl<'a> Fitting<'a> {
         blocks: &mut B,
         mut triangle: Triangle,
         pass: &Pass,
-        shared: &Shared,
+        (shared, poses): (&Shared, &Poses),
         told: &mut dyn FnMut(&Readings<'_>, &Told),
     ) -> Result<(Fit, Vec<FittedNuisance>), B::Error> {
         let sides = shared.shifting(&shared.common).len();
@@ -286,8 +287,12 @@ impl<'a> Fitting<'a> {
             coefficients,
         };
         let whole = packed(&inverse, 1.0);
-        let sums = self.tell(blocks, (pass, &solved, &whole), &parts, told)?;
+        let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
+        let widened = self.widened(blocks, &fit, pass, (shared, poses))?;
+        let closed = (pass, &solved, widened.as_ref());
+        let sums = self.tell(blocks, closed, (&fit, &whole), told)?;
         let quality = sums.quality(condition, determined, pass.excess);
+        let parts = widened.map_or_else(|| fit.parts().clone(), |widened| widened.parts);
         let fit = Fit::from_parts(Parts { quality, ..parts });
         Ok((fit.map_err(|_| FitError::OutOfRange)?, nuisances))
     }
@@ -296,26 +301,29 @@ impl<'a> Fitting<'a> {
     fn tell<B: Blocks>(
         &self,
         blocks: &mut B,
-        (pass, solved, whole): (&Pass, &Solved, &[f64]),
-        parts: &Parts,
+        (pass, solved, widened): (&Pass, &Solved, Option<&Widened>),
+        (fit, whole): (&Fit, &[f64]),
         told: &mut dyn FnMut(&Readings<'_>, &Told),
     ) -> Result<QualitySums, B::Error> {
-        let fit = Fit::from_parts(parts.clone()).map_err(|_| FitError::OutOfRange)?;
-        let watched = Watched::of(&fit);
-        let determined = parts.quality.determined;
+        let (watched, coefficients) = (Watched::of(fit), fit.coefficients());
+        let determined = fit.determined();
         let shrink = shrink(determined, self.known.totals.readings);
         let mut sums = QualitySums::default();
         self.walk(blocks, |block, design| {
             let settled = Settled {
-                nuisances: solved.nuisances(&parts.coefficients),
-                levels: levels(design, &parts.coefficients),
+                nuisances: solved.nuisances(coefficients),
+                levels: levels(design, coefficients),
                 determined,
                 ..self.known.settled(block, design, Some(pass))?
             };
             sums.take(design, &settled, block.limits, self.known.model);
             let by = (self.known.model, shrink);
             let weighed = weighed_by(block, &settled, Vec::new(), by);
-            let influence = Influence::of(design, &settled, solved, whole, watched.clone());
+            let mut influence = Influence::of(design, &settled, solved, whole, watched.clone());
+            if let Some(widened) = widened {
+                let by = widened.variances(&settled.variances, &settled.stated, &weighed);
+                influence = influence.under(by, design, &widened.factor);
+            }
             told(block, &Told { weighed, influence, levels: settled.levels });
             Ok(())
         })?;

@@ -46,6 +46,7 @@
 //!     model: BasisSpec::zernike(0, 0).into(),
 //!     robust: Robust::Tukey,
 //!     optics: None,
+//!     with_truncation: true,
 //! };
 //! let field = blocks::fit(&mut Source, &totals, &asked, &mut |_, _| {})?.fit;
 //! let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.3, phi_rad: 0.0 };
@@ -66,6 +67,7 @@ mod passing;
 mod sketch;
 #[cfg(test)]
 mod tests;
+mod widening;
 
 /// Readings that can be walked through again and again.
 pub trait Blocks {
@@ -128,6 +130,9 @@ pub struct Asked<'a> {
     pub robust: Robust,
     /// The detector's beam, where it is known.
     pub optics: Option<&'a Optics>,
+    /// Whether u holds what the functions can't follow, as by [`Fit::with_truncation`]: one or two more
+    /// walks, with rows that are two to five times as wide.
+    pub with_truncation: bool,
 }
 
 /// A fit of readings that are forgotten.

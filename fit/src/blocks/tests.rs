@@ -85,6 +85,15 @@ const BLOCK: usize = 170;
 
 /// By blocks, and what each reading's weight, residual and influence on the exitance are.
 fn in_blocks(source: &mut Source, model: Penalised, robust: Robust) -> (Blockwise, [Vec<f64>; 3]) {
+    in_blocks_with(source, model, robust, false)
+}
+
+fn in_blocks_with(
+    source: &mut Source,
+    model: Penalised,
+    robust: Robust,
+    with_truncation: bool,
+) -> (Blockwise, [Vec<f64>; 3]) {
     let mut totals = Totals::default();
     let mut look = |block: &Readings<'_>| {
         totals.take(block);
@@ -92,7 +101,7 @@ fn in_blocks(source: &mut Source, model: Penalised, robust: Robust) -> (Blockwis
     };
     source.each(&mut look).unwrap();
     source.walks = 0;
-    let asked = Asked { region: REGION, model, robust, optics: None };
+    let asked = Asked { region: REGION, model, robust, optics: None, with_truncation };
     let mut each = [const { Vec::new() }; 3];
     let outcome = fit(source, &totals, &asked, &mut |_, told| {
         each[0].extend_from_slice(&told.weighed.weights);
@@ -275,6 +284,80 @@ fn what_can_be_seen_is_what_is_seen_of_all_readings() {
     assert_eq!(scattered.theta_rad.limit, Limit::Sampling);
 }
 
+/// A lobe that the basis is too coarse for, on top of the readings.
+fn add_lobe(source: &mut Source, height: f64) {
+    for Sample { ray, value, .. } in &mut source.samples {
+        let off = (ray.theta_rad - 0.5).hypot(ray.theta_rad.sin() * libm::sin(0.5 * ray.phi_rad));
+        *value += height * libm::exp(-(off / 0.2).powi(2));
+    }
+}
+
+/// What the basis can't follow, of the same readings by blocks and in memory.
+fn assert_as_truncated(source: &mut Source, robust: Robust, tolerance: f64) {
+    let (whole, _) = source.in_memory(BASIS.into(), robust);
+    let plain = whole.exitance().u_independent;
+    let (samples, flown, common) = (&source.samples, &source.flown, (source.common)(0));
+    let whole = whole.with_truncation(samples, flown, &common, None).unwrap();
+    let (found, each) = in_blocks_with(source, BASIS.into(), robust, true);
+    let ray = |theta_rad, phi_rad| Ray { x_m: 2e-3, y_m: -5e-3, theta_rad, phi_rad };
+    let numbers = |fit: &Fit| -> Vec<f64> {
+        let rays = [ray(0.0, 0.0), ray(0.5, 0.1), ray(0.8, 3.0), ray(1.35, 5.0)];
+        let along = rays.iter().map(|ray| fit.radiance(ray));
+        let sums = [fit.exitance(), fit.exitance_within(0.9).unwrap(), fit.intensity(0.4, 1.0)];
+        let of = |e: crate::Estimate| [e.value, e.u, e.u_independent];
+        along.chain(sums).flat_map(of).chain([fit.model().truncation, fit.chi2()]).collect()
+    };
+    let truncation = |fit: &Fit| {
+        let found = fit.parts().truncation.clone().unwrap();
+        (found.gain, found.beyond, found.missed.len())
+    };
+    let ((gain, beyond, missed), expected) = (truncation(&found.fit), truncation(&whole));
+    assert!((gain / expected.0 - 1.0).abs() < tolerance, "{gain} {expected:?}");
+    assert_eq!((beyond, missed), (expected.1, expected.2));
+    for (i, (a, b)) in numbers(&found.fit).iter().zip(numbers(&whole)).enumerate() {
+        assert!((a - b).abs() <= tolerance * b.abs(), "number {i}: {a} {b}");
+    }
+    assert!(whole.exitance().u_independent > 1.3 * plain, "{:?} {plain}", whole.exitance());
+    let influence = &whole.influence().unwrap().exitance;
+    let largest = influence.iter().copied().fold(0.0, f64::max);
+    assert_eq!(each[2].len(), influence.len());
+    let off = each[2].iter().zip(influence).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(off <= tolerance * largest, "{off} {largest}");
+}
+
+#[test]
+fn what_functions_cannot_follow_is_in_u_as_in_memory() {
+    for (noise, robust, tolerance) in
+        [(0.42, Robust::None, 1e-6), (0.1, Robust::None, 1e-6), (0.42, Robust::Huber, 1e-3)]
+    {
+        let mut source = Source::new(stated(noise), robust != Robust::None);
+        add_lobe(&mut source, 4.0);
+        assert_as_truncated(&mut source, robust, tolerance);
+    }
+    let mut source = Source::new(|_, _| Noise::Unknown, false);
+    add_lobe(&mut source, 4.0);
+    assert_as_truncated(&mut source, Robust::None, 1e-6);
+    // With limits, shifts and what is fitted along.
+    let mut source = Source::new(modelled, false);
+    (source.common, source.nuisances) = (common, nuisances);
+    add_lobe(&mut source, 6.0);
+    source.limits = (0..READINGS).filter(|i| i % 40 == 7).collect();
+    let way = |sample: &Sample| {
+        let end = |by: f64| Ray { theta_rad: sample.ray.theta_rad + by, ..sample.ray };
+        (sample.ray.theta_rad < 1.3).then(|| (end(-0.05), end(0.05)))
+    };
+    source.flown = source.samples[..2000].iter().map(way).collect();
+    assert_as_truncated(&mut source, Robust::None, 1e-5);
+}
+
+#[test]
+fn where_functions_follow_all_one_more_walk_finds_nothing() {
+    let mut source = Source::new(stated(0.42), false);
+    let (found, _) = in_blocks_with(&mut source, BASIS.into(), Robust::None, true);
+    assert_eq!(source.walks, 4);
+    assert!(found.fit.parts().truncation.is_none());
+}
+
 #[test]
 fn what_makes_no_sense_is_refused_as_in_memory() {
     let refused = |source: &mut Source, model: Penalised| {
@@ -284,7 +367,8 @@ fn what_makes_no_sense_is_refused_as_in_memory() {
             Ok(())
         };
         source.each(&mut look).unwrap();
-        let asked = Asked { region: REGION, model, robust: Robust::None, optics: None };
+        let robust = Robust::None;
+        let asked = Asked { region: REGION, model, robust, optics: None, with_truncation: false };
         fit(source, &totals, &asked, &mut |_, _| {}).unwrap_err()
     };
     let mut source = Source::new(stated(0.42), false);

@@ -21,20 +21,22 @@
 //! Where finer functions make the readings no likelier there is no truncation to speak of, and the
 //! fit stays as it is. What is finer than all readings nothing here can know.
 
+mod heard;
 mod likeliest;
+mod look;
 mod uneven;
 mod wider;
 
-use crate::basis::Basis;
 use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::grid::Grid;
-use crate::penalty::Prior;
 use crate::solve::{levels, needs_a_side, sensitivities};
-use crate::weights::Settled;
-use crate::{Angular, BasisSpec, Common, Fit, FitError, Influence, Position, Ray, Sample};
+use crate::weights::{Settled, has_unknown};
+use crate::{Angular, BasisSpec, Common, Fit, FitError, Position, Ray, Sample};
+use heard::Once;
+pub(crate) use heard::{Heard, Taken, Walks};
 pub use uneven::Uneven;
-use wider::Wider;
+pub(crate) use wider::{Widened, Wider};
 
 /// What a fit misses.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,73 +71,92 @@ impl Fit {
         let (Some(influence), Some(weighed)) = (self.influence(), self.weighed()) else {
             return Ok(self);
         };
-        let Some(Finer { spec, kept, polynomials }) = Finer::of(&self, samples) else {
-            return Ok(self);
-        };
+        let grid = Grid::of(samples, self.region());
+        let places = grid.x_m.len().max(grid.y_m.len());
+        let Some(finer) = Finer::of(&self, places) else { return Ok(self) };
         if influence.variances.len() != samples.len() {
             return Ok(self);
         }
-        let beyond = Basis::new(spec, *self.region())?;
         let own = Design::new(samples, self.functions(), optics)?.in_flight(flown);
-        let design = Design::new(samples, &beyond, optics)?.in_flight(flown);
-        let shared = Shared::of(&self, &own, influence, common)?;
-        let wider = Wider {
-            own,
-            prior: Prior::new(self.functions(), self.penalty())?,
-            shared,
+        let known = Taken {
+            nuisances: influence.columns.len(),
+            holds_constant: own.holds_constant(),
+            has_unknown: has_unknown(samples),
+            excess: influence.excess,
+            robust: weighed.robust,
+        };
+        let wider = Wider::new(&self, finer, &known, common)?;
+        let beyond = Design::new(samples, wider.beyond(), optics)?.in_flight(flown);
+        let (variances, stated) = (&influence.variances, &influence.stated);
+        let heard = Heard {
+            sides: wider.sides(&own, &influence.columns, common)?,
+            own: &own,
+            beyond,
             values: &influence.values,
             weighed,
-            beyond: design,
-            kept,
-            polynomials,
+            variances,
+            stated,
         };
-        let (joint, found) = wider.likeliest(influence)?;
-        wider.widen(&self, &joint, &found)
+        let Some(widened) = wider.widened(&mut Once(&heard))? else { return Ok(self) };
+        let variances = widened.variances(variances, stated, weighed);
+        let influence = influence.under(variances, &own, &widened.factor);
+        let fit = Fit::from_parts(widened.parts).map_err(|_| FitError::OutOfRange)?;
+        let (measured, weighed) = (self.measured().cloned(), weighed.clone());
+        Ok(fit.with_measured(measured).with_weighed(weighed).with_influence(influence))
     }
 }
 
 /// What samples share, as far as it shows in the residuals: what it explains is neither noise nor
 /// truncation.
+#[derive(Debug)]
 struct Shared {
-    /// The change of every value by one u of each component.
-    sides: Vec<Vec<f64>>,
-    /// The fit's shift by it.
+    /// Of those that were not fitted along.
+    names: Vec<String>,
+    /// The fit's shift by one u of each component, of those that were fitted along first.
     shifts: Vec<Vec<f64>>,
 }
 
 impl Shared {
-    fn of(
-        fit: &Fit,
-        own: &Design<'_>,
-        influence: &Influence,
-        common: &[Common],
-    ) -> Result<Self, FitError> {
-        let coefficients = fit.coefficients().to_vec();
-        let levels = levels(own, &coefficients);
-        let settled = Settled::known(coefficients, levels, Vec::new(), Vec::new());
-        let shifts = &fit.parts().shifts;
+    fn of(fit: &Fit, known: &Taken, common: &[Common]) -> Self {
         // What was fitted along, the fit is already corrected for.
-        let none = vec![0.0; own.basis().len()];
-        let mut shared =
-            Self { sides: influence.columns.clone(), shifts: vec![none; influence.columns.len()] };
+        let none = vec![0.0; fit.functions().len()];
+        let mut shared = Self { names: Vec::new(), shifts: vec![none; known.nuisances] };
+        let shifts = &fit.parts().shifts;
         for common in
-            common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, own.holds_constant()))
+            common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, known.holds_constant))
         {
-            let Some(shift) = shifts.iter().find(|shift| shift.name == common.name) else {
-                continue;
-            };
-            let side = sensitivities(own, &settled, &[common])?.pop().unwrap_or_default();
-            if side.iter().any(|value| *value != 0.0) {
-                shared.sides.push(side);
+            let shift = shifts.iter().find(|shift| shift.name == common.name);
+            let Some(shift) = shift else { continue };
+            // One that changes no reading changes no coefficient.
+            if shift.shift.iter().any(|value| *value != 0.0) {
+                shared.names.push(common.name.clone());
                 shared.shifts.push(shift.shift.clone());
             }
         }
-        Ok(shared)
+        shared
+    }
+
+    /// The change of every value by one u of each; `columns` are those of what was fitted along.
+    fn sides(
+        &self,
+        fit: &Fit,
+        own: &Design<'_>,
+        columns: &[Vec<f64>],
+        common: &[Common],
+    ) -> Result<Vec<Vec<f64>>, FitError> {
+        let coefficients = fit.coefficients().to_vec();
+        let levels = levels(own, &coefficients);
+        let settled = Settled::known(coefficients, levels, Vec::new(), Vec::new());
+        let named = |name: &String| common.iter().find(|common| common.name == *name);
+        let common: Vec<&Common> = self.names.iter().filter_map(named).collect();
+        let sides = sensitivities(own, &settled, &common)?;
+        Ok(columns.iter().cloned().chain(sides).collect())
     }
 }
 
 /// What follows what a fit's own functions can't.
-struct Finer {
+#[derive(Debug)]
+pub(crate) struct Finer {
     /// Harmonics on the sphere: under their prior a field that varies as much everywhere.
     spec: BasisSpec,
     /// Those that the fit doesn't have itself.
@@ -149,7 +170,8 @@ impl Finer {
     /// too many, finer ones of the direction matter more: as fine in position as leaves room for two
     /// degrees more in direction. Where even the same everywhere they are too many, those of the fit's
     /// own degrees are left out; `None` where they still are, see [`Fit::with_truncation`].
-    fn of(fit: &Fit, samples: &[Sample]) -> Option<Self> {
+    /// `places`: distinct positions along the axis that has more of them.
+    pub(crate) fn of(fit: &Fit, places: usize) -> Option<Self> {
         let own = fit.basis();
         let degree = match own.angular {
             Angular::Zernike { degree, .. }
@@ -159,10 +181,8 @@ impl Finer {
             Angular::Splines { .. } => OF_SPLINES,
             Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
         };
-        let grid = Grid::of(samples, fit.region());
-        let distinct = grid.x_m.len().max(grid.y_m.len());
         let position = own.position.degree().unwrap_or(0);
-        let most = position.max((position + 1).min(distinct.saturating_sub(1)));
+        let most = position.max((position + 1).min(places.saturating_sub(1)));
         let all = (0..=most).rev().map(|position| (position, 0)).chain([(0, degree + 1)]);
         let tried = all.flat_map(|(position, least)| {
             let degrees = (degree + 2..=degree + DEGREES).rev();

@@ -5,10 +5,11 @@
 //!
 //! It does not know where the field is rough between readings that all others foretell well.
 
-use super::wider::{Joint, Wider};
+use super::heard::{Heard, Walks, direction};
+use super::wider::{Noise, Wider};
+use crate::Symmetry;
 use crate::basis::dot;
 use crate::triangle::Solution;
-use crate::{Ray, Symmetry};
 use faer::Mat;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -90,88 +91,143 @@ fn folded(symmetry: Option<Symmetry>, towards: DVec3) -> DVec3 {
 }
 
 impl Wider<'_> {
-    /// How far readings lie off what all others foretell of them, under the likeliest model: its
-    /// variances are `scale` times the joint ones, and `solution` is of all rows and priors.
-    pub(super) fn uneven(&self, joint: &Joint, scale: f64, solution: &Solution) -> Uneven {
+    /// How far readings lie off what all others foretell of them, under the likeliest model; `solution`
+    /// is of all rows and priors.
+    pub(super) fn uneven<W: Walks>(
+        &self,
+        walks: &mut W,
+        noise: Noise,
+        directions: &Directions,
+        solution: &Solution,
+    ) -> Result<Uneven, W::Error> {
         let (unknowns, factor) = (solution.unknowns(0), solution.inverse_matrix());
-        let mut means = Means { wider: self, rooms: self.rooms(), unknowns: &unknowns };
-        let mut cells = Vec::new();
-        for some in self.directions(joint).chunks(ROWS) {
-            let mut rows = Mat::<f64>::zeros(unknowns.len(), some.len());
-            let residuals: Vec<f64> = (0..some.len())
-                .map(|k| means.residual(&some[k], rows.col_as_slice_mut(k)))
-                .collect();
-            let fitted = factor.transpose() * &rows;
-            cells.extend(some.iter().enumerate().map(|(k, group)| {
-                let n = group.len() as f64;
-                let variances = group.iter().map(|i| joint.variances[*i]);
-                let variance = scale * variances.sum::<f64>() / (n * n);
+        let mut means = Means::new(directions, &unknowns);
+        walks.each(&mut |heard| {
+            means.take(heard, noise, self.kept());
+            Ok(())
+        })?;
+        let cells = means.groups.len();
+        let mut all = Vec::with_capacity(cells);
+        for from in (0..cells).step_by(ROWS) {
+            let some = from..(from + ROWS).min(cells);
+            let fitted = factor.transpose() * means.rows.as_ref().subcols(from, some.len());
+            all.extend(some.enumerate().map(|(k, group)| {
+                let Group { count, variances, residual, towards } = means.groups[group];
+                let variance = variances / (count * count);
                 // What is left of a value beside the others is its residual over this part, with the
                 // variance over it.
                 let known = dot(fitted.col_as_slice(k), fitted.col_as_slice(k)) / variance;
                 let part = (1.0 - known).max(PART_LEAST);
-                let sum: DVec3 = group.iter().map(|i| self.towards(*i)).sum();
-                let ratio = residuals[k] * residuals[k] / (variance * part);
-                Cell { towards: sum.normalize_or(DVec3::Z), ratio }
+                let ratio = residual * residual / (variance * part);
+                Cell { towards: towards.normalize_or(DVec3::Z), ratio }
             }));
         }
-        Uneven { cells, symmetry: None }
-    }
-
-    /// Readings that say what they read, those of about one direction together: of as small a part of
-    /// the sphere as leaves few enough directions.
-    fn directions(&self, joint: &Joint) -> Vec<Vec<usize>> {
-        let is_heard = |i: &usize| {
-            joint.variances[*i].is_finite() && self.weighed.limits.binary_search(i).is_err()
-        };
-        let heard: Vec<usize> = (0..self.values.len()).filter(is_heard).collect();
-        let mut cells_a_unit = CELLS_A_UNIT;
-        loop {
-            let mut cells: BTreeMap<[i32; 3], Vec<usize>> = BTreeMap::new();
-            for i in &heard {
-                let cell = (cells_a_unit * self.towards(*i)).to_array().map(libm::round);
-                #[allow(clippy::cast_possible_truncation)] // up to CELLS_A_UNIT
-                let cell = cell.map(|index| index as i32);
-                cells.entry(cell).or_default().push(*i);
-            }
-            if cells.len() <= CELLS_MAX {
-                return cells.into_values().collect();
-            }
-            cells_a_unit /= 2.0;
-        }
-    }
-
-    fn towards(&self, i: usize) -> DVec3 {
-        let Ray { theta_rad, phi_rad, .. } = self.own.samples()[i].ray;
-        direction(theta_rad, phi_rad)
+        Ok(Uneven { cells: all, symmetry: None })
     }
 }
 
-/// Means over readings.
+/// How many readings lie in about one direction: of as small a part of the sphere as leaves few enough
+/// directions.
+#[derive(Debug)]
+pub(super) struct Directions {
+    /// By fineness, falling: cells a unit, and the readings of each cell, while these are few enough.
+    counts: Vec<(f64, Option<Counts>)>,
+}
+
+type Counts = BTreeMap<[i32; 3], f64>;
+
+impl Directions {
+    /// Of no reading yet.
+    pub(super) fn new() -> Self {
+        let of = |halvings: i32| (CELLS_A_UNIT * f64::powi(0.5, halvings), Some(Counts::new()));
+        Self { counts: (0..FINENESSES).map(of).collect() }
+    }
+
+    /// Takes those in that say what they read.
+    pub(super) fn take(&mut self, heard: &Heard<'_>) {
+        for i in (0..heard.values.len()).filter(|i| heard.is_plain(*i)) {
+            let towards = heard.towards(i);
+            for (cells_a_unit, counts) in &mut self.counts {
+                let Some(cells) = counts else { continue };
+                *cells.entry(cell(*cells_a_unit, towards)).or_default() += 1.0;
+                if cells.len() > CELLS_MAX {
+                    *counts = None;
+                }
+            }
+        }
+    }
+
+    fn finest(&self) -> (f64, &Counts) {
+        let few =
+            self.counts.iter().find_map(|(fineness, counts)| Some((*fineness, counts.as_ref()?)));
+        few.unwrap_or_else(|| unreachable!("the coarsest cells are fewer than {CELLS_MAX}"))
+    }
+}
+
+fn cell(cells_a_unit: f64, towards: DVec3) -> [i32; 3] {
+    let cell = (cells_a_unit * towards).to_array().map(libm::round);
+    #[allow(clippy::cast_possible_truncation)] // up to CELLS_A_UNIT
+    cell.map(|index| index as i32)
+}
+
+/// Readings of one direction together.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    count: f64,
+    variances: f64,
+    /// What they lie off the model on average.
+    residual: f64,
+    towards: DVec3,
+}
+
+/// Means over readings of one direction.
 struct Means<'w> {
-    wider: &'w Wider<'w>,
-    rooms: super::wider::Rooms,
+    cells_a_unit: f64,
+    /// Rising.
+    cells: Vec<[i32; 3]>,
+    groups: Vec<Group>,
+    /// The mean row of each, one a column.
+    rows: Mat<f64>,
     unknowns: &'w [f64],
+    row: Vec<f64>,
 }
 
-impl Means<'_> {
-    /// What some readings lie off the model on average; their mean row goes to `mean`.
-    fn residual(&mut self, group: &[usize], mean: &mut [f64]) -> f64 {
-        let part = 1.0 / group.len() as f64;
-        let mut row = vec![0.0; mean.len()];
-        let mut residual = 0.0;
-        for i in group {
-            self.wider.row(*i, &mut self.rooms, &mut row);
-            residual += part * (self.wider.values[*i] - dot(&row, self.unknowns));
-            mean.iter_mut().zip(&row).for_each(|(mean, value)| *mean += part * value);
+impl<'w> Means<'w> {
+    fn new(directions: &Directions, unknowns: &'w [f64]) -> Self {
+        let (cells_a_unit, counts) = directions.finest();
+        let none = |count: &f64| Group {
+            count: *count,
+            variances: 0.0,
+            residual: 0.0,
+            towards: DVec3::ZERO,
+        };
+        Self {
+            cells_a_unit,
+            cells: counts.keys().copied().collect(),
+            groups: counts.values().map(none).collect(),
+            rows: Mat::zeros(unknowns.len(), counts.len()),
+            unknowns,
+            row: vec![0.0; unknowns.len()],
         }
-        residual
     }
-}
 
-fn direction(theta_rad: f64, phi_rad: f64) -> DVec3 {
-    let (sin, cos) = (libm::sin(theta_rad), libm::cos(theta_rad));
-    DVec3::new(sin * libm::cos(phi_rad), sin * libm::sin(phi_rad), cos)
+    fn take(&mut self, heard: &Heard<'_>, noise: Noise, kept: &[usize]) {
+        let mut rooms = heard.rooms();
+        for i in (0..heard.values.len()).filter(|i| heard.is_plain(*i)) {
+            let towards = heard.towards(i);
+            let found = self.cells.binary_search(&cell(self.cells_a_unit, towards));
+            // The same readings come each time.
+            let Ok(at) = found else { continue };
+            heard.row(i, kept, &mut rooms, &mut self.row);
+            let group = &mut self.groups[at];
+            let part = 1.0 / group.count;
+            group.residual += part * (heard.values[i] - dot(&self.row, self.unknowns));
+            group.variances += noise.scale * heard.variance(i, noise.is_stated);
+            group.towards += towards;
+            let mean = self.rows.col_as_slice_mut(at);
+            mean.iter_mut().zip(&self.row).for_each(|(mean, value)| *mean += part * value);
+        }
+    }
 }
 
 /// Directions that tell of one between them.
@@ -184,6 +240,8 @@ const PART_LEAST: f64 = 1e-6;
 /// About a quarter of a degree, and more where directions are more than this.
 const CELLS_A_UNIT: f64 = 200.0;
 const CELLS_MAX: usize = 2000;
+/// Cells half as fine, and so on, of which the last are fewer than this on all the sphere.
+const FINENESSES: i32 = 6;
 /// Rows at a time.
 const ROWS: usize = 256;
 

@@ -122,8 +122,8 @@ pub(crate) struct FitArgs {
     /// With --chart perpendicular or environment: draw the field in all directions, as an SVG file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["partial", "merge"])]
     pub(crate) picture: Option<PathBuf>,
-    /// Read the readings again and again, in blocks, instead of keeping them: bounded memory, and no u
-    /// of truncation. Default: of a CSV of more than 50000 rows, of a run of more than 200000 readings.
+    /// Read the readings again and again, in blocks, instead of keeping them: bounded memory. Default:
+    /// of a CSV of more than 50000 rows, of a run of more than 200000 readings.
     #[arg(long, conflicts_with_all = ["partial", "merge", "picture", "monte_carlo"])]
     pub(crate) in_blocks: bool,
     /// Print fit.json.
