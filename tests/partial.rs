@@ -180,6 +180,7 @@ fn the_basis_of_a_long_file_is_chosen_from_some_of_its_sweeps() {
     let readings = chosen["n_readings"].as_u64().unwrap();
     assert!((100..=6000).contains(&readings), "{chosen}");
     assert_eq!(whole["n_used"], 60_000);
+    assert!(whole["notes"][2].as_str().unwrap().contains("(extrapolation)"), "{}", whole["notes"]);
     // A wrong sample is named by its line, were it left out of the choice or not.
     let mut lines: Vec<&str> = text.lines().collect();
     let wrong = lines[777].replacen(lines[777].split(',').nth(2).unwrap(), "95.5", 1);

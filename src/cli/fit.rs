@@ -36,6 +36,9 @@ pub(super) const FIT_HELP: &str =
 /// A run of more readings is read in blocks: of this many all that is made of them takes half a gigabyte.
 const RUN_KEPT_MAX: u64 = 200_000;
 const IN_BLOCKS: &str = "read in blocks, no sample kept";
+/// Where others than the chosen functions are not fitted.
+const NOT_DOUBTED: &str = "u has no part for what other bases make of directions where nothing was measured (extrapolation): \
+     that takes all samples at once";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
 
@@ -142,7 +145,8 @@ fn fit_long_run(
     let treatment = Treatment::of_readings(wish.rules.robust, made.treated, &made.nuisances)
         .with_rules(made.ruled.symmetry.as_ref(), made.ruled.nonnegative.as_ref())
         .with_drift(made.drift.as_ref());
-    let notes = [IN_BLOCKS.to_owned()];
+    let mut notes = vec![IN_BLOCKS.to_owned()];
+    notes.extend(made.ruled.choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
     let file = FitFile {
         fit,
         treatment: &treatment,
@@ -297,7 +301,8 @@ fn fit_stream(
     let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
-    let notes = [note_on_u(scan.has_u, args.u_relative), IN_BLOCKS.to_owned()];
+    let mut notes = vec![note_on_u(scan.has_u, args.u_relative), IN_BLOCKS.to_owned()];
+    notes.extend(choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment = Treatment::of_readings(wish.rules.robust, treated, &[])
         .with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());

@@ -24,7 +24,7 @@ use crate::weights::{PASSES_MAX, REWEIGHING_MAX, SETTLED_RELATIVE, Settled, exce
 use crate::{Common, Fit, FitError, FittedNuisance, Readings, Resolves, Robust, Shift};
 
 /// Fits readings that come in blocks, as [`fit_readings`](crate::fit_readings) does readings that are
-/// there. Of weights that are settled, and of noise that is what it was said to be, it takes three walks; `told`
+/// there. Of weights that are settled, and of noise that is what it was said to be, it takes three walks, and for truncation one or two more; `told`
 /// hears of every block in the last one.
 pub fn fit<B: Blocks>(
     blocks: &mut B,
