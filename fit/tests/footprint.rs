@@ -130,6 +130,30 @@ fn a_field_whose_readings_run_over_the_outline_comes_back_within_its_u() {
     assert!(rows(&averaged).cut > 50, "{:?}", rows(&averaged));
 }
 
+/// Footprints at 80° reach 28 mm beyond a region of ±10 mm, along whichever axis.
+#[test]
+fn a_slope_that_goes_on_beyond_the_region_is_followed_at_grazing() {
+    let region = region(0.01, 80.0);
+    let slope = |ray: &Ray| 1.0 + 12.0 * ray.x_m - 5.0 * ray.y_m;
+    let places = [-0.01, 0.0, 0.01].map(|x| [-0.01, 0.01].map(|y| (x, y)));
+    let turns = [0.0, 72.0, 144.0, 216.0, 288.0];
+    let of = |(x, y)| {
+        let tilts = [0.0, 40.0, 60.0, 80.0];
+        tilts.map(|theta| turns.map(|phi| ray(x, y, theta, phi))).into_iter().flatten()
+    };
+    let rays: Vec<Ray> = places.into_iter().flatten().flat_map(of).collect();
+    let read = samples(&rays, |ray| read(&stock(), ray, 1 << 14, &slope));
+    let optics = Optics { beam: stock(), outline: None };
+    let basis = BasisSpec::zernike(2, 1);
+    let fit = fit::fit_seen(&read, &region, basis, &[], Some(&optics)).unwrap();
+    assert_eq!(rows(&fit).cut, 0, "{:?}", rows(&fit));
+    let asked = [ray(0.006, 0.006, 72.0, 10.0), ray(-0.01, 0.0, 80.0, 0.0)];
+    for ray in asked {
+        let off = fit.value(&ray) - slope(&ray);
+        assert!(off.abs() < 2e-5, "{off:e} at {ray:?}");
+    }
+}
+
 #[test]
 fn cut_rows_are_the_shares_of_rays_that_leave_the_sample() {
     let basis = BasisSpec::zernike(0, 0);

@@ -128,6 +128,7 @@ impl Places {
     /// Half widths from the middle at which the terms become constant.
     pub(crate) fn continued(&self) -> f64 {
         match self.position {
+            Position::Legendre { degree: 0 | 1 } => CONTINUED_LINE,
             Position::Legendre { .. } => CONTINUED,
             Position::Splines { .. } => 1.0,
         }
@@ -261,5 +262,9 @@ impl Line {
 
 /// Cubic.
 const SPLINES_DEGREE: usize = 3;
-/// The position polynomials end here, in half widths of the region from its middle.
+/// The position polynomials end here, in half widths of the region from its middle: one of degree 6
+/// is a thousand times as large there as within.
 const CONTINUED: f64 = 2.0;
+/// A line doesn't run away: it goes on as far as a footprint reaches at grazing, since the mean over
+/// a footprint is then the value at its centroid, as along a sample that goes on.
+const CONTINUED_LINE: f64 = 8.0;
