@@ -48,6 +48,12 @@ pub(crate) fn create(folder: &Path, setup: &Setup) -> Result<(Journal, Header), 
     if let Some(parent) = folder.parent() {
         std::fs::create_dir_all(parent).map_err(|error| no_folder(parent, &error))?;
     }
+    create_within(folder, setup)
+}
+
+/// The same in a folder that is there: one that was taken away meanwhile, since all of it shall end, is
+/// not made again.
+pub(crate) fn create_within(folder: &Path, setup: &Setup) -> Result<(Journal, Header), Failure> {
     std::fs::create_dir(folder).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => exists_already(folder),
         _ => no_folder(folder, &error),

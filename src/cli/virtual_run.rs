@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::acquire::{Acquired, Company, Pace, acquire};
 use super::failure::Failure;
-use super::folder::create;
+use super::folder::create_within;
 use super::run::{first_job, why_not_whole};
 use super::setup::Setup;
 use crate::journal::{EffectWishes, Input, InputRole, Order};
@@ -54,10 +54,11 @@ impl Texts<'_> {
 }
 
 impl VirtualRun {
-    /// Makes the run; its journal stays in `folder`, which must not be there yet.
+    /// Makes the run; its journal stays in `folder`, which must not be there yet. The folder around it
+    /// must be.
     pub(crate) fn kept(setup: Setup, folder: &Path) -> Result<Self, Failure> {
         let acquired = acquire(&setup, Pace::Virtual, Company::AmongOthers, || {
-            let (journal, _) = create(folder, &setup)?;
+            let (journal, _) = create_within(folder, &setup)?;
             Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
         })?;
         let Acquired { outcome, rig_s, journal } = acquired;

@@ -68,7 +68,7 @@ fn in_rig_time(
     entries: &[Entry],
     folder: &Path,
 ) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder.join("runs"))
+    std::fs::create_dir(folder.join("runs"))
         .map_err(|error| Failure::start(format!("{}: {error}", folder.display())))?;
     let rows = run_all(entries, folder, args.seeds)?;
     let points = points(&rows);
