@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::lamp::Variant;
 use super::{Draws, Lamp};
 
 /// A kind of scene.
@@ -22,7 +23,7 @@ pub enum Family {
     /// Brightest on a ring; drawn: level, the ring's angle, valley, sharpness.
     Batwing,
     /// After a measured photometric file, interpolated between its angles; drawn: the lamp, how far it
-    /// is turned about its axis, level.
+    /// is turned about its axis, how much wider or narrower its beam is, level.
     Photometric,
 }
 
@@ -142,7 +143,11 @@ impl Family {
             }
             Self::Photometric => {
                 let lamp = &lamps[draws.below(lamps.len())];
-                let bytes = lamp.file(draws.uniform(), level, PATCH_M2).into_bytes();
+                let turn = draws.uniform();
+                // What the basis misses of one lamp is one number; of its like it is as many.
+                let wider_deg = draws.between(-WIDER_DEG, WIDER_DEG);
+                let variant = Variant { turn, wider_deg };
+                let bytes = lamp.file(variant, level, PATCH_M2).into_bytes();
                 attachments.push(Attachment { name: TABLE.to_owned(), bytes });
                 format!("[[emitter]]\nkind = \"photometric-file\"\nfile = \"{TABLE}\"\n{OUTLINE}")
             }
@@ -235,6 +240,8 @@ const TABLE: &str = "table.ies";
 /// Wide enough that no beam reaches beyond it.
 const OUTLINE: &str = "x_mm = [-60, 60]\ny_mm = [-60, 60]\n";
 const PATCH_M2: f64 = 0.12 * 0.12;
+/// Half a step between the readings' rings and more: a lamp's edges then lie anywhere between them.
+const WIDER_DEG: f64 = 5.0;
 
 const SCALE_KEYS: [&str; 5] = [
     "u_distance_mm",

@@ -1,9 +1,20 @@
-//! A measured lamp as a scene of the study: its photometric file, turned about its axis and brought to
-//! another level. It does not know which lamps there are, nor what a fit makes of them.
+//! A measured lamp as a scene of the study: its photometric file, turned about its axis, its beam made
+//! wider or narrower, and brought to another level. It does not know which lamps there are, nor what a
+//! fit makes of them.
 
 use std::fmt::Write as _;
 
 use photometry_files::lm63::{Photometry, Symmetry};
+
+/// What makes another lamp of one that was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variant {
+    /// Parts of a turn about its axis, to whole planes.
+    pub turn: f64,
+    /// How much wider its beam is at 45°, degrees: angles γ become γ + this sin 2γ, which leaves the axis
+    /// and the lamp's own plane where they are. Within ±28°, so that angles keep their order.
+    pub wider_deg: f64,
+}
 
 /// A lamp's intensities.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,22 +41,29 @@ impl Lamp {
             }
         }
         let lamp = Self { gamma_deg, c_deg, planes };
-        (is_whole && lamp.brightest() > 0.0).then_some(lamp)
+        (is_whole && lamp.brightest(&lamp.gamma_deg) > 0.0).then_some(lamp)
     }
 
     /// I / cos γ where it is largest within 80°: the radiance along the brightest ray, times the area.
-    fn brightest(&self) -> f64 {
+    fn brightest(&self, gamma_deg: &[f64]) -> f64 {
         let along = |plane: &Vec<f64>| {
-            let angles = self.gamma_deg.iter().zip(plane).take_while(|(gamma, _)| **gamma <= 80.0);
+            let angles = gamma_deg.iter().zip(plane).take_while(|(gamma, _)| **gamma <= 80.0);
             angles.map(|(gamma, value)| value / libm::cos(gamma.to_radians())).fold(0.0, f64::max)
         };
         self.planes.iter().map(along).fold(0.0, f64::max)
     }
 
-    /// An LM-63 file of the lamp turned by a part of a turn, to whole planes; its intensities such that
-    /// a patch of this area has this radiance along its brightest ray.
-    pub fn file(&self, turn: f64, radiance: f64, area_m2: f64) -> String {
-        let scale = radiance * area_m2 / self.brightest();
+    /// An LM-63 file of a variant of the lamp; its intensities such that a patch of this area has this
+    /// radiance along its brightest ray.
+    pub fn file(&self, variant: Variant, radiance: f64, area_m2: f64) -> String {
+        let Variant { turn, wider_deg } = variant;
+        let wider = |gamma: &f64| gamma + wider_deg * libm::sin(2.0 * gamma.to_radians());
+        // The last angles as they are: a sine of half a turn is not quite zero.
+        let is_own = |gamma: &f64| [0.0, 90.0, 180.0].contains(gamma);
+        let own = self.gamma_deg.iter();
+        let gamma_deg: Vec<f64> =
+            own.map(|gamma| if is_own(gamma) { *gamma } else { wider(gamma) }).collect();
+        let scale = radiance * area_m2 / self.brightest(&gamma_deg);
         // The last plane is the first one again.
         let round = self.planes.len() - 1;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below `round`
@@ -59,7 +77,7 @@ impl Lamp {
             text.push_str(&words.join(" "));
             text.push('\n');
         };
-        line(&mut self.gamma_deg.iter().copied());
+        line(&mut gamma_deg.iter().copied());
         line(&mut self.c_deg.iter().copied());
         for plane in 0..planes {
             line(&mut self.planes[(first + plane) % round].iter().map(|value| scale * value));
@@ -84,13 +102,35 @@ pub(super) mod tests {
     fn a_turned_lamp_has_its_planes_further_on_and_the_radiance_asked_for() {
         let lamp = lamp();
         // Along 60° of the fourth plane L A = 7 / cos 60°.
-        let file = lamp.file(0.3, 2.0, 0.5);
+        let file = lamp.file(Variant { turn: 0.3, wider_deg: 0.0 }, 2.0, 0.5);
         let read = photometry_files::lm63::read(file.as_bytes()).expect("a sound file");
         let at = |c| read.intensity(c, 60.0) / 0.5 / 0.5;
         let found = [0.0, 90.0, 180.0, 270.0, 360.0].map(at);
         let expected = [2.0, 3.0, 7.0, 1.0, 2.0].map(|part| 2.0 * part / 7.0);
         let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-12, "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_wider_lamp_has_its_shoulder_further_out_and_ends_where_it_did() {
+        let narrow = lamp().file(Variant { turn: 0.0, wider_deg: 0.0 }, 2.0, 0.5);
+        let wide = lamp().file(Variant { turn: 0.0, wider_deg: 4.0 }, 2.0, 0.5);
+        let [narrow, wide] = [narrow, wide]
+            .map(|file| photometry_files::lm63::read(file.as_bytes()).expect("a sound file"));
+        // 60° + 4° sin 120°.
+        let shoulder_deg = 60.0 + 2.0 * 3.0_f64.sqrt();
+        let angles = wide.gamma_deg();
+        assert!((angles[1] - shoulder_deg).abs() < 1e-9, "{angles:?}");
+        assert_eq!(
+            (angles[0].to_bits(), angles[2].to_bits()),
+            (0.0_f64.to_bits(), 90.0_f64.to_bits())
+        );
+        // The same radiance along the brightest ray, which lies further out.
+        let radiance = |lamp: &Photometry, gamma: f64| {
+            lamp.intensity(270.0, gamma) / libm::cos(gamma.to_radians())
+        };
+        let (a, b) = (radiance(&narrow, 60.0), radiance(&wide, shoulder_deg));
+        assert!((a - 1.0).abs() < 1e-12 && (b - 1.0).abs() < 1e-12, "{a} {b}");
     }
 
     #[test]
