@@ -165,16 +165,21 @@ impl Family {
             Self::Lobe => (6, ("12", "24")),
             Self::AnyLobe => (8, ("10", "20")),
             Self::OffAxis | Self::Batwing => (12, ("8", "14.4")),
-            Self::Photometric => (14, ("8", "12")),
+            // Rings closer than the lamps' edges are wide: the basis is to be what limits, and of what
+            // lies between readings no fit knows.
+            Self::Photometric => (14, ("5", "12")),
         };
         let (places, position_degree) =
             if self == Self::Gradient { ((3, 2), 1) } else { ((1, 1), 0) };
+        // Lamps end in a kink on the horizon, and are measured nearly up to there.
+        let theta_max_deg = if self == Self::Photometric { 85 } else { 80 };
         let mut plan = String::from(PLAN);
         let (theta_step, phi_step) = steps_deg;
         // Writing to a string does not fail.
         let _ = write!(
             plan,
-            "\n[schedule]\nkind = \"cgamma\"\nx_count = {}\ny_count = {}\nc_step_deg = {phi_step}\n\
+            "\n[region]\nx_mm = [-10, 10]\ny_mm = [-10, 10]\ntheta_max_deg = {theta_max_deg}\n\
+             \n[schedule]\nkind = \"cgamma\"\nx_count = {}\ny_count = {}\nc_step_deg = {phi_step}\n\
              gamma_step_deg = {theta_step}\norder = \"travel\"\n{FIT}angular_degree = \
              {angular_degree}\nposition_degree = {position_degree}\n",
             places.0, places.1,
@@ -254,11 +259,6 @@ const SCALE_KEYS: [&str; 5] = [
 const PLAN: &str = r#"name = "coverage"
 rig = "rig.toml"
 scene = "scene.toml"
-
-[region]
-x_mm = [-10, 10]
-y_mm = [-10, 10]
-theta_max_deg = 80
 
 [dwell]
 dwell_ms = 50
