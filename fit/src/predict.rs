@@ -113,8 +113,7 @@ pub fn predict(
     }
     let coefficients: Vec<Vec<f64>> =
         (1..=sides.len()).map(|side| solution.unknowns(side)).collect();
-    let residuals: Vec<f64> =
-        sides.iter().zip(&coefficients).map(|(side, c)| residual_rms(&design, side, c)).collect();
+    let residuals = residual_rms(&design, &sides, &coefficients);
 
     let settled = Settled::known(coefficients[0].clone(), sides.swap_remove(0), variances, moved);
     let shifts = carried(&common, &design, &settled, &solution, &prior)?;
@@ -193,12 +192,17 @@ fn on_sample(design: &Design<'_>) -> Vec<f64> {
     (0..design.samples().len()).map(|i| design.level(i, &unity, &mut room)).collect()
 }
 
-fn residual_rms(design: &Design<'_>, readings: &[f64], coefficients: &[f64]) -> f64 {
-    let mut room = design.room();
-    let mut row = vec![0.0; coefficients.len()];
-    let squares = readings.iter().enumerate().map(|(i, reading)| {
+/// Root mean square of reading less fit, of each side. To make a beam's row costs far more than to
+/// multiply it by every side's coefficients.
+fn residual_rms(design: &Design<'_>, sides: &[Vec<f64>], coefficients: &[Vec<f64>]) -> Vec<f64> {
+    let (mut room, mut row) = (design.room(), vec![0.0; design.basis().len()]);
+    let readings = design.samples().len();
+    let mut squares = vec![0.0; sides.len()];
+    for i in 0..readings {
         design.row(i, &mut room, &mut row);
-        (reading - dot(&row, coefficients)).powi(2)
-    });
-    (squares.sum::<f64>() / readings.len() as f64).sqrt()
+        for ((squares, side), own) in squares.iter_mut().zip(sides).zip(coefficients) {
+            *squares += (side[i] - dot(&row, own)).powi(2);
+        }
+    }
+    squares.into_iter().map(|squares| (squares / readings as f64).sqrt()).collect()
 }
