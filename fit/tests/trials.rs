@@ -6,8 +6,10 @@ use fit::{
     BasisSpec, Common, Estimate, Fit, FitError, Functional, Noise, Penalised, Penalty, Ray,
     Readings, Region, Sample, Shift,
 };
+use radiometry::direction::unit;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
+use std::f64::consts::FRAC_PI_2;
 
 /// Standard normal deviates (Box, Muller 1958).
 fn normals(seed: u64) -> impl FnMut() -> f64 {
@@ -161,6 +163,43 @@ fn a_peak_is_higher_and_scatters_as_noisy_refits_do() {
     assert!(excess.iter().all(|excess| *excess > -1e-9));
     assert!(excess.iter().sum::<f64>() / 2000.0 > 0.01 * trial.u);
     assert!((trial.u / top.radiance.u - 1.0).abs() < 0.1, "{} {top:?}", trial.u);
+}
+
+#[test]
+fn a_peaks_direction_is_known_as_its_trials_scatter() {
+    let (samples, common) = (samples(0.3, &mut normals(1)), common());
+    let readings = Readings { common: &common, ..Readings::of(&samples) };
+    let fit = fit::fit_readings(&readings, &REGION, BasisSpec::zernike(4, 0), None).unwrap();
+    let top = fit.peak();
+    let found = fit.pointing(&top).unwrap();
+    let axis = unit(top.ray.theta_rad, top.ray.phi_rad);
+    let theta = unit(top.ray.theta_rad + FRAC_PI_2, top.ray.phi_rad);
+    let mut off = (Vec::new(), Vec::new());
+    fit.trials(&readings, None).unwrap().run(4000, &mut normals(5), &mut |trial| {
+        let ray = trial.peak().ray;
+        let towards = unit(ray.theta_rad, ray.phi_rad);
+        off.0.push(towards.dot(theta));
+        off.1.push(towards.dot(axis.cross(theta)));
+    });
+    let u = |values: Vec<f64>| Spread::of(values).unwrap().u;
+    // A standard deviation of 4000 is known to 1.1 %.
+    for (stated, scatter) in [(found.u_theta_rad, u(off.0)), (found.u_across_rad, u(off.1))] {
+        assert!((stated / scatter - 1.0).abs() < 0.06, "{stated} {scatter}");
+    }
+}
+
+#[test]
+fn no_direction_is_stated_of_a_flat_field_or_of_one_that_rises_to_the_end_of_its_cone() {
+    let of = |value: &dyn Fn(f64) -> f64| {
+        let flat = samples(0.3, &mut normals(1)).into_iter();
+        let flat = flat.map(|sample| Sample { value: value(sample.ray.theta_rad), ..sample });
+        let fit = fit::fit(&flat.collect::<Vec<_>>(), &REGION, BasisSpec::zernike(4, 0), &[]);
+        let fit = fit.unwrap();
+        fit.pointing(&fit.peak())
+    };
+    assert_eq!(of(&|_| 100.0), None);
+    assert_eq!(of(&|theta| 100.0 + 30.0 * theta.sin().powi(2)), None);
+    assert!(of(&|theta| 100.0 - 30.0 * theta.sin().powi(2)).is_some());
 }
 
 #[test]

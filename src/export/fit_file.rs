@@ -175,6 +175,9 @@ impl FitFile<'_> {
         at["value"] = json!(peak.radiance.value);
         at["u"] = json!(peak.radiance.u);
         at["u_independent"] = json!(peak.radiance.u_independent);
+        let pointing = fit.pointing(&peak);
+        at["u_theta_deg"] = json!(pointing.map(|u| u.u_theta_rad.to_degrees()));
+        at["u_across_deg"] = json!(pointing.map(|u| u.u_across_rad.to_degrees()));
         let parts = fit.radiance_contributions(&peak.ray);
         put_budget(&mut at, &parts, &self.independent.peak, 1.0);
         object.insert(quantity.peak_key().to_owned(), at);
@@ -387,6 +390,8 @@ mod tests {
         for key in ["x_mm", "y_mm", "theta_deg", "phi_deg", "u"] {
             number(&format!("/peak_radiance/{key}"));
         }
+        // Of a flat field no direction is known.
+        assert!(json["peak_radiance"]["u_theta_deg"].is_null());
         for key in ["condition", "residual_rms", "dof", "n_used", "n_flagged"] {
             number(&format!("/{key}"));
         }

@@ -8,7 +8,7 @@ use super::words::Words;
 use crate::cli::results::Results;
 use crate::cli::setup::Setup;
 use crate::cli::text::{percent, with_uncertainty};
-use crate::report::Table;
+use crate::report::{Table, significant};
 use crate::rig::calibration::{Calibrated, Fitted};
 
 /// Nodes along each side of the region for the true intensity.
@@ -67,10 +67,17 @@ fn rows(setup: &Setup, results: &Results, fit: &Fit) -> Vec<Row> {
         let on_axis = intensity_on_axis(setup);
         rows.push(row(&name, fit.intensity(0.0, 0.0), words.intensity_unit, on_axis));
     }
-    let name = format!("peak {}, {}", words.radiance, place(&peak.ray));
+    let known = fit.pointing(&peak).map(pointing).unwrap_or_default();
+    let name = format!("peak {}, {}{known}", words.radiance, place(&peak.ray));
     let largest = truth.and_then(|t| t.peak).map(|peak| peak.value);
     rows.push(row(&name, peak.radiance, words.radiance_unit, largest));
     rows
+}
+
+/// How well the direction is known, after it.
+fn pointing(known: fit::Pointing) -> String {
+    let angle = |u_rad: f64| significant(u_rad.to_degrees(), 2);
+    format!(" (u {}° along θ, {}° across)", angle(known.u_theta_rad), angle(known.u_across_rad))
 }
 
 fn place(ray: &fit::Ray) -> String {
