@@ -11,7 +11,7 @@ use super::args::FitArgs;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
-use super::long_run;
+use super::long_run::{self, IN_BLOCKS, NOT_DOUBTED};
 use super::monte_carlo::{self, Dice};
 use super::output::{note, say, write_out};
 use super::partial;
@@ -33,12 +33,6 @@ use crate::rig::calibration::{Fitted, IndependentParts, calibrate};
 
 pub(super) const FIT_HELP: &str =
     "lower --angular-degree or --position-degree, or measure what is not determined";
-/// A run of more readings is read in blocks: of this many all that is made of them takes half a gigabyte.
-const RUN_KEPT_MAX: u64 = 200_000;
-const IN_BLOCKS: &str = "read in blocks, no sample kept";
-/// Where others than the chosen functions are not fitted.
-const NOT_DOUBTED: &str = "u has no part for what other bases make of directions where nothing was measured (extrapolation): \
-     that takes all samples at once";
 /// A larger CSV is not what a rig makes: 2 GiB.
 const CSV_BYTES_MAX: u64 = 2 << 30;
 
@@ -95,8 +89,7 @@ fn fit_run(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Wanted]) -> O
     let (mut setup, _, reader) = open_run(&args.source)?;
     setup.plan.derive.extend_from_slice(wanted);
     let wish = wished(args, setup.plan.fit)?;
-    let is_long = reader.reading_count()? > RUN_KEPT_MAX && dice.is_none();
-    if args.in_blocks || is_long {
+    if args.in_blocks || (dice.is_none() && long_run::is_long(&reader)?) {
         return fit_long_run(args, rays, (&setup, &reader, &wish));
     }
     let readings = reader.readings(Order::Taken)?;
@@ -139,14 +132,13 @@ fn fit_long_run(
     (setup, reader, wish): (&Setup, &Reader, &Wish),
 ) -> Outcome {
     let made = long_run::fit(setup, reader, wish)?;
+    let notes = made.notes();
     let fit = &made.ruled.fit;
     let quantity = setup.rig.detector.quantity;
     let derived = derive::derive(fit, quantity, &setup.plan.derive);
     let treatment = Treatment::of_readings(wish.rules.robust, made.treated, &made.nuisances)
         .with_rules(made.ruled.symmetry.as_ref(), made.ruled.nonnegative.as_ref())
         .with_drift(made.drift.as_ref());
-    let mut notes = vec![IN_BLOCKS.to_owned()];
-    notes.extend(made.ruled.choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
     let file = FitFile {
         fit,
         treatment: &treatment,

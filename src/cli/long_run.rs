@@ -16,9 +16,22 @@ use crate::export::TreatedReadings;
 use crate::journal::Reader;
 use crate::rig::Reading;
 use crate::rig::calibration::{
-    Calibration, FirstLook, FittedDrift, Handing, IndependentParts, IndependentSums, Part, Sample,
-    Spread,
+    Calibrated, Calibration, Component, FirstLook, FittedDrift, Handing, IndependentParts,
+    IndependentSums, Part, Sample, Spread,
 };
+
+/// A run of more readings is read in blocks, by `gonio fit` and at its end: of this many all that is made of
+/// them takes half a gigabyte.
+const RUN_KEPT_MAX: u64 = 200_000;
+pub(super) const IN_BLOCKS: &str = "read in blocks, no sample kept";
+/// Where others than the chosen functions are not fitted.
+pub(super) const NOT_DOUBTED: &str = "u has no part for what other bases make of directions where nothing was measured (extrapolation): \
+     that takes all samples at once";
+
+/// Whether a run is read in blocks without being asked.
+pub(super) fn is_long(reader: &Reader) -> Result<bool, Failure> {
+    Ok(reader.reading_count()? > RUN_KEPT_MAX)
+}
 
 /// What a run's fit says that was made in blocks.
 pub(super) struct LongFit {
@@ -33,9 +46,12 @@ pub(super) struct LongFit {
 }
 
 /// A journal, and what three looks at it found.
-struct LongRun<'a> {
+pub(super) struct LongRun<'a> {
     reader: &'a Reader,
-    calibration: Calibration<'a>,
+    pub(super) calibration: Calibration<'a>,
+    /// What all samples share, or all of a range or session.
+    components: Vec<Component>,
+    pub(super) n_samples: usize,
     handing: Handing,
     totals: Totals,
     /// Whole sweeps of those that are no limits.
@@ -54,28 +70,20 @@ struct Block {
 
 /// Fits a run by its journal, a block at a time.
 pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit, Failure> {
-    let run = LongRun::open(setup, reader, wish)?;
-    run.handing.demand(&wish.rules).map_err(|error| refused(&error))?;
-    let (region, optics) = (fit_region(setup), optics(setup));
-    let samples = run.gleaning.clone().into_samples();
-    let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())
-        .map_err(|error| refused(&error))?;
-    let robust = wish.rules.robust;
-    let asked = Asked { region, model, robust, optics: optics.as_ref(), with_truncation: true };
-    let (Blockwise { fit, nuisances, resolves }, closing) = run.fit(&asked)?;
-    let ruled = fit.clone().ruled(&wish.rules).map_err(|error| refused(&error))?;
-    let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();
-    let independent = closing.sums.parts(&ruled.fit);
-    Ok(LongFit {
-        ruled: Ruled { choice, ..ruled },
-        resolves,
-        drift: run.handing.drift.clone(),
-        nuisances,
-        treated: closing.treated,
-        independent: if is_as_fitted { independent } else { IndependentParts::NONE },
-        n_flagged: closing.n_flagged,
-        n_excluded: run.n_excluded,
+    let made = LongRun::open(setup, reader, wish)?.fit_wished(setup, wish);
+    made.map_err(|stopped| match stopped {
+        Stopped::Source(failure) => failure,
+        Stopped::Fit(error) => refused(&error),
     })
+}
+
+impl LongFit {
+    /// What files must say of it.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = vec![IN_BLOCKS.to_owned()];
+        notes.extend(self.ruled.choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
+        notes
+    }
 }
 
 /// What the last walk sums up.
@@ -86,7 +94,7 @@ struct Closing {
 }
 
 impl<'a> LongRun<'a> {
-    fn open(setup: &'a Setup, reader: &'a Reader, wish: &Wish) -> Result<Self, Failure> {
+    pub(super) fn open(setup: &'a Setup, reader: &'a Reader, wish: &Wish) -> Result<Self, Failure> {
         let mut look = FirstLook::default();
         each_block(reader, |block| {
             block
@@ -95,17 +103,24 @@ impl<'a> LongRun<'a> {
                 .map_err(Failure::midway)
         })?;
         let calibration = look.calibration(&setup.rig).map_err(Failure::midway)?;
-        let mut spread = Spread::default();
+        let (mut spread, mut whole) = (Spread::default(), Spread::default());
         each_block::<Failure>(reader, |block| {
             let samples = calibration.samples(block);
-            samples.iter().filter(|s| s.part() != Part::None).for_each(|s| spread.take(s));
+            for sample in &samples {
+                whole.take(sample);
+                if sample.part() != Part::None {
+                    spread.take(sample);
+                }
+            }
             Ok(())
         })?;
         let components = calibration.components(&spread);
         let handing = Handing::new(components, &calibration.references, &spread, &wish.rules);
         let mut run = Self {
             reader,
+            components: calibration.components(&whole),
             calibration,
+            n_samples: 0,
             handing,
             totals: Totals::default(),
             gleaning: Gleaning::new(KEPT_MAX),
@@ -121,6 +136,7 @@ impl<'a> LongRun<'a> {
 
     fn count(&mut self, block: &[Reading]) {
         let samples = self.calibration.samples(block);
+        self.n_samples += samples.len();
         let input = self.handing.usable(&samples);
         self.totals.take(&input.readings(&[]));
         let is_limit = |i: usize| input.limits.binary_search(&i).is_ok();
@@ -132,7 +148,49 @@ impl<'a> LongRun<'a> {
         }
     }
 
-    fn fit(&self, asked: &Asked<'_>) -> Result<(Blockwise, Closing), Failure> {
+    /// What all of its samples share, and none of them.
+    pub(super) fn calibrated(&self) -> Calibrated {
+        Calibrated {
+            samples: Vec::new(),
+            components: self.components.clone(),
+            references: self.calibration.references.clone(),
+            darks: self.calibration.darks.clone(),
+        }
+    }
+
+    /// Hands its readings over, as they were taken, block by block.
+    pub(super) fn each(&self, mut take: impl FnMut(&[Reading])) -> Result<(), Failure> {
+        each_block::<Failure>(self.reader, |block| {
+            take(block);
+            Ok(())
+        })
+    }
+
+    /// Fits it as a plan or a person wishes.
+    pub(super) fn fit_wished(&self, setup: &Setup, wish: &Wish) -> Result<LongFit, Stopped> {
+        self.handing.demand(&wish.rules)?;
+        let (region, optics) = (fit_region(setup), optics(setup));
+        let samples = self.gleaning.clone().into_samples();
+        let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())?;
+        let robust = wish.rules.robust;
+        let asked = Asked { region, model, robust, optics: optics.as_ref(), with_truncation: true };
+        let (Blockwise { fit, nuisances, resolves }, closing) = self.fit(&asked)?;
+        let ruled = fit.clone().ruled(&wish.rules)?;
+        let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();
+        let independent = closing.sums.parts(&ruled.fit);
+        Ok(LongFit {
+            ruled: Ruled { choice, ..ruled },
+            resolves,
+            drift: self.handing.drift.clone(),
+            nuisances,
+            treated: closing.treated,
+            independent: if is_as_fitted { independent } else { IndependentParts::NONE },
+            n_flagged: closing.n_flagged,
+            n_excluded: self.n_excluded,
+        })
+    }
+
+    fn fit(&self, asked: &Asked<'_>) -> Result<(Blockwise, Closing), Stopped> {
         let mut closing = Closing {
             sums: IndependentSums::default(),
             treated: self.left_out.clone(),
@@ -154,11 +212,7 @@ impl<'a> LongRun<'a> {
             let flagged = places.iter().filter(|place| is_flagged(&samples[**place]));
             closing.n_flagged += flagged.count();
         });
-        let fitted = fitted.map_err(|stopped| match stopped {
-            Stopped::Source(failure) => failure,
-            Stopped::Fit(error) => refused(&error),
-        })?;
-        Ok((fitted, closing))
+        Ok((fitted?, closing))
     }
 }
 
@@ -218,4 +272,4 @@ fn each_block<E: From<Failure>>(
 
 /// Enough for what a block costs beside its rows, few enough for a hundred components' effects on each: a
 /// megabyte.
-const BLOCK_READINGS: u32 = 1024;
+pub(super) const BLOCK_READINGS: u32 = 1024;

@@ -2,6 +2,7 @@
 //! course of its accuracy; and the files of its folder. A run that just ended, one that is fitted
 //! again, one of a ladder and one of the daemon's all come through here.
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use fit::{Fit, FitError, Optics, Region, Rules, Wish};
@@ -10,8 +11,11 @@ use super::adapting;
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
 use super::folder::JOURNAL;
+use super::long_results::{self, InBlocks};
+use super::long_run;
 use super::report::{self, REPORT, RunRecord};
 use super::setup::Setup;
+use super::tally::Tally;
 use crate::export::{
     AccuracyPoint, DerivedQuantity, ExportError, FitFile, MonteCarlo, SamplesMeta, Treatment,
     TruePeak, Truth, write_accuracy, write_atomically, write_readings, write_samples,
@@ -26,12 +30,15 @@ use crate::study::Score;
 const ACCURACY_POINTS: u32 = 12;
 /// Beyond this condition a least-squares fit asks for regularisation rather than for digits: an
 /// error of 1e-4 may be one of the order of 1.
-const ACCURACY_CONDITION_MAX: f64 = 1e4;
+pub(super) const ACCURACY_CONDITION_MAX: f64 = 1e4;
 
 /// What a run says.
 #[derive(Debug)]
 pub(crate) struct Results {
+    /// Of a run in blocks it has some of the samples.
     pub(crate) calibrated: Calibrated,
+    /// Of all samples.
+    pub(super) tally: Tally,
     /// The fit, or why there is none.
     pub(crate) fitted: Result<Fitted, FitError>,
     pub(crate) truth: Option<Truth>,
@@ -44,9 +51,25 @@ pub(crate) struct Results {
     pub(crate) independent: IndependentParts,
     /// What the plan asks to be derived from the fit.
     pub(crate) derived: Vec<DerivedQuantity>,
+    /// Of a run in blocks: what all its samples would say.
+    pub(super) blocks: Option<InBlocks>,
 }
 
 impl Results {
+    /// What a run's journal says, and the readings that its report is made of. A long run, or one that
+    /// shall be, is read in blocks: of it these are the readings beside its targets'.
+    pub(crate) fn of_run(
+        setup: &Setup,
+        reader: &Reader,
+        in_blocks: bool,
+    ) -> Result<(Self, Vec<Reading>), Failure> {
+        if in_blocks || long_run::is_long(reader)? {
+            return Self::in_blocks(setup, &setup.plan.fit, reader);
+        }
+        let readings = reader.readings(Order::Taken)?;
+        Ok((Self::of(setup, setup.plan.fit, &readings)?, readings))
+    }
+
     /// Calibrates and fits a run's readings. An error is one of the readings; a fit that is not
     /// possible is a result too, since the samples stand.
     pub(crate) fn of(setup: &Setup, wish: Wish, readings: &[Reading]) -> Result<Self, Failure> {
@@ -74,12 +97,23 @@ impl Results {
             .as_ref()
             .map_or(IndependentParts::NONE, |fitted| calibrated.independent_parts(fitted));
         let score = score.flatten();
-        Ok(Self { calibrated, fitted, truth, score, accuracy, levels, independent, derived })
+        Ok(Self {
+            tally: Tally::of(&calibrated.samples),
+            calibrated,
+            fitted,
+            truth,
+            score,
+            accuracy,
+            levels,
+            independent,
+            derived,
+            blocks: None,
+        })
     }
 
     /// Samples that carry a flag.
     pub(crate) fn n_flagged(&self) -> usize {
-        self.calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count()
+        self.tally.flagged
     }
 
     /// Writes every file of the run's folder but the journal, each whole or not at all.
@@ -98,14 +132,14 @@ impl Results {
         setup: &Setup,
         record: &RunRecord<'_>,
     ) -> Result<(), ExportError> {
-        let RunRecord { header, readings, .. } = *record;
+        let RunRecord { header, reader, .. } = *record;
         let quantity = setup.rig.detector.quantity;
         write_atomically(&folder.join("samples.csv"), |out| {
-            write_samples(out, quantity, &self.calibrated.samples)
+            self.write_samples(out, setup, reader)
         })?;
         self.write_meta(&folder.join("samples.meta.json"), setup, header)?;
         write_atomically(&folder.join("readings.csv"), |out| {
-            write_readings(out, &setup.rig, readings.iter().cloned())
+            write_readings(out, &setup.rig, long_results::readings_taken(reader))
         })?;
         write_atomically(&folder.join("accuracy.csv"), |out| {
             write_accuracy(out, quantity, &self.accuracy)
@@ -124,6 +158,19 @@ impl Results {
         write_atomically(&folder.join(REPORT), |out| report.write(out))
     }
 
+    /// Writes samples.csv.
+    pub(crate) fn write_samples(
+        &self,
+        out: impl Write,
+        setup: &Setup,
+        reader: &Reader,
+    ) -> io::Result<()> {
+        if self.blocks.is_some() {
+            return long_results::write_samples(out, setup, self, reader);
+        }
+        write_samples(out, setup.rig.detector.quantity, &self.calibrated.samples)
+    }
+
     /// Writes what samples.csv can't say in columns.
     pub(crate) fn write_meta(
         &self,
@@ -140,6 +187,8 @@ impl Results {
             plan_name: &header.plan_name,
             plan_hash: &header.plan_hash,
             started_utc: &header.started_utc,
+            targets_measured: self.tally.measured,
+            samples_flagged: self.tally.flagged,
             targets_planned: targets_planned(setup),
             effects: &header.effects,
         };
@@ -150,8 +199,13 @@ impl Results {
     pub(crate) fn treatment<'a>(&'a self, fitted: &'a Fitted) -> Treatment<'a> {
         let samples = &self.calibrated.samples;
         let named = |sample: &Sample| (u64::from(sample.reading), sample.ray(), sample.value);
-        let left_out = samples.iter().filter(|sample| sample.part() == Part::None).map(named);
-        Treatment::of(&fitted.fit, |i| named(&samples[fitted.places[i]]), left_out)
+        let of_all = || {
+            let left_out = samples.iter().filter(|sample| sample.part() == Part::None).map(named);
+            Treatment::of(&fitted.fit, |i| named(&samples[fitted.places[i]]), left_out)
+        };
+        self.blocks
+            .as_ref()
+            .map_or_else(of_all, InBlocks::treatment)
             .with_rules(fitted.symmetry.as_ref(), fitted.nonnegative.as_ref())
             .with_drift(fitted.drift.as_ref())
     }
@@ -174,7 +228,7 @@ impl Results {
             simulated: setup.rig.is_simulated(),
             n_flagged: self.n_flagged(),
             n_excluded: fitted.n_excluded,
-            notes: &[],
+            notes: self.blocks.as_ref().map_or(&[], InBlocks::notes),
             truth: self.truth,
             independent: &self.independent,
             derived: &self.derived,

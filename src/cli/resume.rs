@@ -27,7 +27,7 @@ pub(crate) fn resume(args: &ResumeArgs) -> Outcome {
         Some(job) => acquire(&setup, pace, Company::Alone, || Ok((Journal::open(&journal)?, job)))?,
         None => nothing_left(&args.dir, Journal::open(&journal)?, &left),
     };
-    let ending = Ending { is_strict: args.strict, is_json: args.json };
+    let ending = Ending { is_strict: args.strict, is_json: args.json, in_blocks: args.in_blocks };
     finish(&args.dir, &setup, acquired, began, ending)
 }
 

@@ -16,7 +16,6 @@ use super::setup::Setup;
 use super::stopping;
 use super::summary::Summary;
 use super::text::shell_word;
-use crate::journal::Order;
 use crate::plan::{DarkMethod, Plan};
 use crate::rig::Reading;
 use crate::run::{self, Job, OnFault};
@@ -26,6 +25,8 @@ use crate::run::{self, Job, OnFault};
 pub(crate) struct Ending {
     pub(crate) is_strict: bool,
     pub(crate) is_json: bool,
+    /// Whether a run of any length is read in blocks.
+    pub(crate) in_blocks: bool,
 }
 
 /// The main job.
@@ -44,7 +45,7 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
         let (journal, _) = create(&folder, &setup)?;
         Ok((journal, first_job(&setup, OnFault::Finish, pace)?))
     })?;
-    let ending = Ending { is_strict: args.strict, is_json: args.json };
+    let ending = Ending { is_strict: args.strict, is_json: args.json, in_blocks: args.in_blocks };
     finish(&folder, &setup, acquired, began, ending)
 }
 
@@ -82,16 +83,20 @@ pub(crate) fn finish(
     let is_as_planned = outcome.is_as_planned();
     let setup = setup.clone().with_rounds(journal.reader())?;
     let setup = &adapting::concluded(setup, journal.reader())?;
-    let readings = journal.reader().readings(Order::Taken)?;
-    let results = match Results::of(setup, setup.plan.fit, &readings) {
+    let reader = journal.reader();
+    let (results, readings) = match Results::of_run(setup, reader, ending.in_blocks) {
         // Too little was measured to say anything.
         Err(_) if !is_as_planned => return Err(interrupted(folder, &outcome)),
         results => results?,
     };
-    let (header, sessions) = (journal.reader().header()?, journal.reader().sessions()?);
-    let events = journal.reader().events()?;
-    let record =
-        RunRecord { header: &header, readings: &readings, sessions: &sessions, events: &events };
+    let (header, sessions, events) = (reader.header()?, reader.sessions()?, reader.events()?);
+    let record = RunRecord {
+        header: &header,
+        reader,
+        readings: &readings,
+        sessions: &sessions,
+        events: &events,
+    };
     results.write(folder, setup, &record)?;
     let closed = journal.close();
     let summary = Summary {
@@ -115,8 +120,8 @@ pub(crate) fn finish(
         return Err(Failure::midway(missed));
     }
     let n_excluded = results.fitted.as_ref().map_or(usize::MAX, |fitted| fitted.n_excluded);
-    let is_measured = outcome != run::Outcome::Complete
-        || results.calibrated.samples.len() == targets_planned(setup);
+    let is_measured =
+        outcome != run::Outcome::Complete || results.tally.measured == targets_planned(setup);
     let is_whole = is_measured && n_excluded == 0;
     Ok(exit_code(is_whole && !(ending.is_strict && results.n_flagged() > 0)))
 }

@@ -11,7 +11,7 @@ use super::failure::Failure;
 use super::folder::{JOURNAL, create};
 use super::inputs::Bundle;
 use super::report::RunRecord;
-use super::results::{Results, read_run, targets_planned};
+use super::results::{Results, open_run, targets_planned};
 use super::resume::{self, what_is_left};
 use super::run::first_job;
 use super::session::utc_now;
@@ -19,7 +19,7 @@ use super::setup::{Setup, Stage};
 use super::stopping;
 use super::text::with_uncertainty;
 use crate::daemon::{Checked, Finished, Prepared, Refusal, Workshop};
-use crate::journal::{EffectWishes, Input, InputRole, Journal, JournalError, Reader, Writer};
+use crate::journal::{EffectWishes, Input, InputRole, Journal, JournalError, Writer};
 use crate::rig::Rig;
 use crate::run::OnFault;
 use crate::run::resume::rule_met;
@@ -203,18 +203,18 @@ impl Workshop for Shop {
 
 impl Shop {
     fn evaluate(&self, folder: &Path) -> Result<Finished, Failure> {
-        let (setup, header, readings) = read_run(folder)?;
-        let results = Results::of(&setup, setup.plan.fit, &readings)?;
-        let reader = Reader::open(&folder.join(JOURNAL))?;
+        let (setup, header, reader) = open_run(folder)?;
+        let (results, readings) = Results::of_run(&setup, &reader, false)?;
         let (sessions, events) = (reader.sessions()?, reader.events()?);
         let record = RunRecord {
             header: &header,
+            reader: &reader,
             readings: &readings,
             sessions: &sessions,
             events: &events,
         };
         results.write(folder, &setup, &record)?;
-        let (measured, planned) = (results.calibrated.samples.len(), targets_planned(&setup));
+        let (measured, planned) = (results.tally.measured, targets_planned(&setup));
         let fit = match &results.fitted {
             Ok(fitted) => {
                 let exitance = fitted.fit.exitance();

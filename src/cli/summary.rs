@@ -16,7 +16,6 @@ use super::stopping;
 use super::text::{duration, percent, row, table, with_uncertainty};
 use crate::export::{Treatment, charted};
 use crate::rig::Quantity;
-use crate::rig::calibration::Flag;
 use crate::run::Outcome;
 use crate::study::Trend;
 
@@ -44,7 +43,7 @@ impl Summary<'_> {
             row("time in rig", duration(self.rig_s)),
             row("time on the clock", duration(self.wall_s)),
         ];
-        let flags = self.flags();
+        let flags: Vec<_> = results.tally.flags().collect();
         if !flags.is_empty() {
             let list: Vec<String> = flags.iter().map(|(flag, n)| format!("{n} {flag}")).collect();
             rows.push(row("flags", list.join(", ")));
@@ -55,6 +54,7 @@ impl Summary<'_> {
         }
         rows.extend(adapting::rows(setup));
         rows.extend(self.fit_rows());
+        rows.extend(results.remarks().into_iter().map(|remark| row("note", remark)));
         rows.push(row("folder", self.folder.display().to_string()));
         rows.push(row("report", self.folder.join(REPORT).display().to_string()));
         table(&rows)
@@ -114,10 +114,13 @@ impl Summary<'_> {
             "targets_planned": planned,
             "rig_s": self.rig_s,
             "wall_s": self.wall_s,
-            "flags": self.flags().into_iter().map(|(f, n)| (f.to_owned(), json!(n))).collect::<serde_json::Map<_, _>>(),
+            "flags": results.tally.flags().map(|(f, n)| (f.to_owned(), json!(n))).collect::<serde_json::Map<_, _>>(),
             "folder": self.folder.display().to_string(),
             "report": self.folder.join(REPORT).display().to_string(),
         });
+        if results.blocks.is_some() {
+            object["notes"] = json!(results.remarks());
+        }
         if setup.plan.adaptive().is_some() {
             object["adaptive"] = adapting::as_json(setup);
         }
@@ -161,17 +164,7 @@ impl Summary<'_> {
     }
 
     fn targets(&self) -> (usize, usize) {
-        (self.results.calibrated.samples.len(), targets_planned(self.setup))
-    }
-
-    /// Flags that occur, with how often.
-    fn flags(&self) -> Vec<(&'static str, usize)> {
-        let samples = &self.results.calibrated.samples;
-        Flag::ALL
-            .iter()
-            .map(|flag| (flag.name(), samples.iter().filter(|s| s.flags.contains(*flag)).count()))
-            .filter(|(_, count)| *count > 0)
-            .collect()
+        (self.results.tally.measured, targets_planned(self.setup))
     }
 }
 

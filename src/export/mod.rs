@@ -48,6 +48,6 @@ pub use monte_carlo::{COVERAGE_95, MonteCarlo, PeakDirection, Propagated};
 pub use partial_file::{PartialFile, PartialFileError, PartialsDiffer, ReadPartial};
 pub use ray_chart::{ListedRay, RayChart};
 pub use readings::write_readings;
-pub use samples::{RayColumns, write_samples};
+pub use samples::{RayColumns, SamplesFile, write_samples};
 pub use samples_meta::SamplesMeta;
 pub use treatment::{TreatedReading, TreatedReadings, Treatment, Why, write_weights};

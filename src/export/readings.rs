@@ -12,12 +12,12 @@ use crate::rig::{AXES, DeviceTimes, Latched, Reading, ReadingKind, Rig, forward}
 pub fn write_readings(
     out: impl Write,
     rig: &Rig,
-    readings: impl IntoIterator<Item = Reading>,
+    readings: impl IntoIterator<Item = io::Result<Reading>>,
 ) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(columns(rig))?;
     for reading in readings {
-        csv.write_record(fields(rig, &reading))?;
+        csv.write_record(fields(rig, &reading?))?;
     }
     csv.flush()
 }

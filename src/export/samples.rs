@@ -53,29 +53,51 @@ impl From<Pose> for RayColumns {
 /// Writes samples.csv. The columns of the contract come first; after them the parts of the
 /// uncertainty, the repeat, and the reading in readings.csv.
 pub fn write_samples(out: impl Write, quantity: Quantity, samples: &[Sample]) -> io::Result<()> {
-    let radiance = quantity.radiance_column();
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(columns(radiance))?;
-    for sample in samples {
-        let [x, y, theta, phi] = RayColumns::from(sample.pose).numbers().map(number);
-        csv.write_record([
-            sample.index.to_string(),
-            number(sample.time_s),
-            x,
-            y,
-            theta,
-            phi,
-            number(sample.value),
-            number(sample.u),
-            number(sample.dwell_s),
-            sample.flags.to_string(),
-            number(sample.u_independent),
-            number(sample.u_common),
-            sample.repeat.to_string(),
-            sample.reading.to_string(),
-        ])?;
+    let mut file = SamplesFile::new(out, quantity)?;
+    file.append(samples)?;
+    file.close()
+}
+
+/// samples.csv, some samples after the others: for a run whose samples are not all kept.
+#[derive(Debug)]
+pub struct SamplesFile<W: Write>(csv::Writer<W>);
+
+impl<W: Write> SamplesFile<W> {
+    /// Begins it with its header.
+    pub fn new(out: W, quantity: Quantity) -> io::Result<Self> {
+        let mut csv = csv::Writer::from_writer(out);
+        csv.write_record(columns(quantity.radiance_column()))?;
+        Ok(Self(csv))
     }
-    csv.flush()
+
+    /// Writes a line a sample, in their order.
+    pub fn append(&mut self, samples: &[Sample]) -> io::Result<()> {
+        for sample in samples {
+            let [x, y, theta, phi] = RayColumns::from(sample.pose).numbers().map(number);
+            self.0.write_record([
+                sample.index.to_string(),
+                number(sample.time_s),
+                x,
+                y,
+                theta,
+                phi,
+                number(sample.value),
+                number(sample.u),
+                number(sample.dwell_s),
+                sample.flags.to_string(),
+                number(sample.u_independent),
+                number(sample.u_common),
+                sample.repeat.to_string(),
+                sample.reading.to_string(),
+            ])?;
+        }
+        Ok(())
+    }
+
+    /// After the last one.
+    pub fn close(mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// The header of samples.csv, `radiance` being the quantity's column.

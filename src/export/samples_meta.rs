@@ -13,7 +13,7 @@ use crate::rig::{Axis, AxisName, Rig};
 pub struct SamplesMeta<'a> {
     /// The rig that took the samples.
     pub rig: &'a Rig,
-    /// The samples, with what they share.
+    /// What the samples share; of a long run it need not have them all.
     pub calibrated: &'a Calibrated,
     /// The program's version.
     pub program_version: &'a str,
@@ -27,6 +27,10 @@ pub struct SamplesMeta<'a> {
     pub plan_hash: &'a str,
     /// When the run began: UTC, RFC 3339.
     pub started_utc: &'a str,
+    /// The samples.
+    pub targets_measured: usize,
+    /// Those that carry a flag.
+    pub samples_flagged: usize,
     /// Target readings that the plan asks for, repeats counted.
     pub targets_planned: usize,
     /// The effects that the scene called for; empty on hardware.
@@ -41,9 +45,8 @@ impl SamplesMeta<'_> {
     }
 
     fn value(&self) -> Value {
-        let (quantity, samples) = (self.rig.detector.quantity, &self.calibrated.samples);
-        let (measured, planned) = (samples.len(), self.targets_planned);
-        let flagged = samples.iter().filter(|sample| !sample.flags.is_empty()).count();
+        let quantity = self.rig.detector.quantity;
+        let (measured, planned) = (self.targets_measured, self.targets_planned);
         json!({
             "program": format!("gonio {}", self.program_version),
             "simulated": self.simulated,
@@ -62,7 +65,7 @@ impl SamplesMeta<'_> {
             "targets": format!("{measured} of {planned} targets measured"),
             "targets_measured": measured,
             "targets_planned": planned,
-            "samples_flagged": flagged,
+            "samples_flagged": self.samples_flagged,
             "flags": Flag::ALL.map(Flag::name),
             "common_components": self.components(),
             "pose": self.rig.axes.iter().map(axis).collect::<Value>(),

@@ -268,7 +268,7 @@ fn readings_csv_holds_every_kind_raw() {
         reading(3, ReadingKind::Target { index: 5, repeat: 1 }),
     ];
     let mut out = Vec::new();
-    write_readings(&mut out, &rig, readings).unwrap();
+    write_readings(&mut out, &rig, readings.into_iter().map(Ok)).unwrap();
     let text = String::from_utf8(out).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
@@ -300,6 +300,8 @@ fn the_metadata_say_what_is_missing_and_what_is_common() {
         plan_name: "luminaire",
         plan_hash: "00ff",
         started_utc: "2026-11-22T01:02:03Z",
+        targets_measured: 1,
+        samples_flagged: 0,
         targets_planned: 3,
         effects: &[],
     };

@@ -27,6 +27,8 @@ pub enum Order {
     Id,
     /// As they were taken and committed.
     Taken,
+    /// Those that are no target's, then by target and repeat: as samples.csv has them.
+    Target,
 }
 
 /// A run's file, open for reading.
@@ -192,6 +194,7 @@ impl Reader {
         let order = match order {
             Order::Id => "ORDER BY id",
             Order::Taken => "ORDER BY position",
+            Order::Target => "ORDER BY target_index, target_repeat, id",
         };
         let mut each = || {
             let mut statement = self.connection.prepare(&format!("{READING}{order}"))?;

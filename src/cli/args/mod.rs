@@ -171,6 +171,10 @@ pub(crate) struct RunArgs {
     /// Exit with 1 if any reading carries a flag.
     #[arg(long)]
     pub(crate) strict: bool,
+    /// Read the readings again and again, in blocks, at the end, instead of keeping them: bounded memory.
+    /// Default: of more than 200000 readings.
+    #[arg(long)]
+    pub(crate) in_blocks: bool,
     /// Print the summary as one JSON document.
     #[arg(long)]
     pub(crate) json: bool,
@@ -189,6 +193,10 @@ pub(crate) struct ResumeArgs {
     /// Exit with 1 if any reading carries a flag.
     #[arg(long)]
     pub(crate) strict: bool,
+    /// Read the readings again and again, in blocks, at the end, instead of keeping them: bounded memory.
+    /// Default: of more than 200000 readings.
+    #[arg(long)]
+    pub(crate) in_blocks: bool,
     /// Print the summary as one JSON document.
     #[arg(long)]
     pub(crate) json: bool,

@@ -8,7 +8,7 @@ use crate::cli::text::{duration, percent};
 use crate::device::Composer;
 use crate::journal::{Event, EventKind, InputRole};
 use crate::report::significant;
-use crate::rig::calibration::{Fitted, Flag, Part};
+use crate::rig::calibration::Fitted;
 
 /// What nobody may overlook.
 pub(super) fn banners(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Vec<String> {
@@ -19,7 +19,7 @@ pub(super) fn banners(setup: &Setup, results: &Results, record: &RunRecord<'_>) 
                 .to_owned(),
         );
     }
-    let (measured, planned) = (results.calibrated.samples.len(), targets_planned(setup));
+    let (measured, planned) = (results.tally.measured, targets_planned(setup));
     if measured < planned {
         banners.push(format!("{measured} of {planned} targets measured."));
     }
@@ -108,8 +108,7 @@ fn mm(m: f64) -> String {
 /// The end of the last reading or of the last session, whichever is later.
 pub(super) fn rig_time_s(results: &Results, record: &RunRecord<'_>) -> f64 {
     let sessions = record.sessions.iter().filter_map(|session| session.ended.as_ref());
-    let readings = results.calibrated.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
-    sessions.map(|(ended_s, _)| *ended_s).chain(readings).fold(0.0, f64::max)
+    sessions.map(|(ended_s, _)| *ended_s).fold(results.tally.ended_s, f64::max)
 }
 
 fn ending(record: &RunRecord<'_>) -> String {
@@ -125,21 +124,14 @@ fn ending(record: &RunRecord<'_>) -> String {
 }
 
 fn targets(setup: &Setup, results: &Results) -> String {
-    let (measured, planned) = (results.calibrated.samples.len(), targets_planned(setup));
+    let (measured, planned) = (results.tally.measured, targets_planned(setup));
     format!("{measured} of {planned} measured")
 }
 
 fn flags(results: &Results) -> String {
-    let samples = &results.calibrated.samples;
-    let of = |flag: Flag| samples.iter().filter(|s| s.flags.contains(flag)).count();
-    let counts = Flag::ALL.map(|flag| (of(flag), flag.name()));
-    let said: Vec<String> = counts
-        .iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, name)| format!("{count} {name}"))
-        .collect();
-    let excluded = samples.iter().filter(|s| s.part() == Part::None).count();
-    match (said.is_empty(), excluded) {
+    let counts = results.tally.flags();
+    let said: Vec<String> = counts.map(|(name, count)| format!("{count} {name}")).collect();
+    match (said.is_empty(), results.tally.left_out) {
         (true, _) => "none".to_owned(),
         (false, 0) => said.join(", "),
         (false, n) => format!("{}; {n} left out of the fit", said.join(", ")),
@@ -169,6 +161,10 @@ pub(super) fn notes(setup: &Setup, results: &Results) -> Vec<String> {
              corrected.",
             drift.readings
         ));
+    }
+    let remarks = results.remarks();
+    if !remarks.is_empty() {
+        notes.push(format!("A long run: {}.", remarks.join("; ")));
     }
     let Ok(fitted) = &results.fitted else { return notes };
     let fit = &fitted.fit;

@@ -38,7 +38,7 @@ pub(super) fn section(setup: &Setup, results: &Results) -> Option<Section> {
     };
     flagged.sort_by_key(place);
     let (all, listed) = (flagged.len(), flagged.len().min(LISTED_MAX));
-    let mut paragraphs = vec![format!("{all} readings carry a flag or are far from the fit.")];
+    let mut paragraphs = vec![count(results, all)];
     if let Some(treatment) = &treatment {
         let rule = match treatment.robust() {
             Robust::None => "Outliers were not reweighed.".to_owned(),
@@ -92,6 +92,15 @@ pub(super) fn section(setup: &Setup, results: &Results) -> Option<Section> {
     };
     let title = "Excluded and flagged readings".to_owned();
     Some(Section { title, paragraphs, table, ..Section::default() })
+}
+
+fn count(results: &Results, listed: usize) -> String {
+    let said = format!("{listed} readings carry a flag or are far from the fit.");
+    let (kept, of) = (results.calibrated.samples.len(), results.tally.measured);
+    if kept == of {
+        return said;
+    }
+    format!("{said} Of {of} that the run has, {kept} were kept for this report.")
 }
 
 /// The effects that a simulated rig was compiled to; `None` on hardware.

@@ -17,9 +17,8 @@ use serde_json::json;
 use super::adapting;
 use super::args::ReportArgs;
 use super::failure::{Failure, Outcome};
-use super::folder::JOURNAL;
 use super::output::{say, say_json, write_out};
-use super::results::{Results, read_run};
+use super::results::{Results, open_run};
 use super::setup::Setup;
 use super::summary::unseen_in_words;
 use super::text::{row, table};
@@ -35,6 +34,9 @@ pub(crate) const REPORT: &str = "report.html";
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunRecord<'a> {
     pub(crate) header: &'a Header,
+    /// Has its readings, whatever their number.
+    pub(crate) reader: &'a Reader,
+    /// Of a run in blocks those beside its targets'.
     pub(crate) readings: &'a [Reading],
     pub(crate) sessions: &'a [Session],
     pub(crate) events: &'a [Event],
@@ -42,12 +44,16 @@ pub(crate) struct RunRecord<'a> {
 
 /// Renders a run's report again.
 pub(crate) fn report(args: &ReportArgs) -> Outcome {
-    let (setup, header, readings) = read_run(&args.dir)?;
-    let reader = Reader::open(&args.dir.join(JOURNAL))?;
+    let (setup, header, reader) = open_run(&args.dir)?;
     let (sessions, events) = (reader.sessions()?, reader.events()?);
-    let results = Results::of(&setup, setup.plan.fit, &readings)?;
-    let record =
-        RunRecord { header: &header, readings: &readings, sessions: &sessions, events: &events };
+    let (results, readings) = Results::of_run(&setup, &reader, false)?;
+    let record = RunRecord {
+        header: &header,
+        reader: &reader,
+        readings: &readings,
+        sessions: &sessions,
+        events: &events,
+    };
     let report = of(&setup, &results, &record);
     let output = args.output.clone().unwrap_or_else(|| args.dir.join(REPORT));
     if output == Path::new("-") {

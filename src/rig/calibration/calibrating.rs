@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::dark::{self, Dark};
 use super::reference::{self, Reference};
-use super::{CalibrationError, Sample, sample};
+use super::{Calibrated, CalibrationError, Sample, sample};
 use crate::rig::{Reading, ReadingKind, Rig};
 
 /// What has to be known of all readings before any of them is a sample.
@@ -50,6 +50,13 @@ impl FirstLook {
             reference.map(|reading| reference::from_reading(rig, &darks, reading)).collect();
         references.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.id.cmp(&b.id)));
         Ok(Calibration { rig, darks, references })
+    }
+}
+
+impl Calibrated {
+    /// How these samples came about, for more of the same run's readings.
+    pub fn calibration<'r>(&self, rig: &'r Rig) -> Calibration<'r> {
+        Calibration { rig, darks: self.darks.clone(), references: self.references.clone() }
     }
 }
 
