@@ -311,10 +311,13 @@ impl Search<'_> {
     fn candidate(&self, variant: &Variant, dwell_ms: f64) -> Option<Candidate> {
         let (plan, text) = self.with(&variant.changes, dwell_ms)?;
         let sequence = plan.lay_out(self.rig, self.list).ok()?;
-        let forecast = Forecast::of(&plan, self.rig, &sequence).ok()?;
         let (time_s, dwell_ms) = (sequence.prediction.total_s(), ms(plan.dwell));
-        let in_time = plan.stop.rig_time_max.is_none_or(|most| time_s <= most.as_secs_f64());
-        in_time.then(|| Candidate { what: variant.what.clone(), text, dwell_ms, time_s, forecast })
+        // Asked first: a forecast costs far more than the time does.
+        if plan.stop.rig_time_max.is_some_and(|most| time_s > most.as_secs_f64()) {
+            return None;
+        }
+        let forecast = Forecast::of(&plan, self.rig, &sequence).ok()?;
+        Some(Candidate { what: variant.what.clone(), text, dwell_ms, time_s, forecast })
     }
 
     /// The plan with these changes and this dwell, if its text can be changed so.
