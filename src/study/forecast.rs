@@ -144,12 +144,12 @@ impl Forecast {
         }
         let photon_limit = libm::sqrt(coefficients as f64 / photoelectrons(&samples));
         let features = [prior.in_direction(plan), prior.in_position(plan)];
-        jitter(rig, &features, &calibrated, &mut samples);
         let fields: Vec<Vec<f64>> = features
             .iter()
             .flat_map(Features::iter)
             .map(|feature| samples.iter().map(|sample| feature.radiance(&sample.ray)).collect())
             .collect();
+        jitter(rig, &features, &fields, &calibrated, &mut samples);
         let (region, optics) = (region(plan), optics.as_ref());
         let mut predicted =
             fit::predict(&samples, &flown, &region, model, &common, optics, &fields)?;
@@ -232,18 +232,29 @@ fn photoelectrons(samples: &[Sample]) -> f64 {
 }
 
 /// Each position is known to its axis's readback alone: where a feature is steep that is noise. What it
-/// does to the expected field is among the components.
-fn jitter(rig: &Rig, features: &[Features; 2], calibrated: &Calibrated, samples: &mut [Sample]) {
-    for (sample, own) in samples.iter_mut().zip(&calibrated.samples) {
+/// does to the expected field is among the components. `fields` are the features' radiances along the
+/// samples' rays, in the features' order.
+fn jitter(
+    rig: &Rig,
+    features: &[Features; 2],
+    fields: &[Vec<f64>],
+    calibrated: &Calibrated,
+    samples: &mut [Sample],
+) {
+    for (i, (sample, own)) in samples.iter_mut().zip(&calibrated.samples).enumerate() {
         let AxisPositions(at) = own.positions;
         let mut variance = 0.0;
-        for (i, axis) in rig.axes.iter().enumerate() {
+        for (axis, of) in rig.axes.iter().enumerate() {
             let mut moved = at;
-            moved[i] += axis.u_readback;
+            moved[axis] += of.u_readback;
             let seen = ray(forward(AxisPositions(moved)));
+            let mut fields = fields.iter();
             for kind in features.iter().filter(|kind| !kind.is_empty()) {
-                let change = |f: &Feature| (f.radiance(&seen) - f.radiance(&sample.ray)).powi(2);
-                variance += kind.iter().map(change).sum::<f64>() / kind.len() as f64;
+                let pairs = kind.iter().zip(fields.by_ref().take(kind.len()));
+                let change = |(feature, field): (&Feature, &Vec<f64>)| {
+                    (feature.radiance(&seen) - field[i]).powi(2)
+                };
+                variance += pairs.map(change).sum::<f64>() / kind.len() as f64;
             }
         }
         add(&mut sample.noise, variance);
