@@ -11,6 +11,8 @@
 //! at most M(Λ)/Λᵏ (Cauchy), M being the largest modulus over slopes Λ times the beam's; a rule
 //! that is exact below errs by at most twice what remains.
 
+use std::collections::HashMap;
+
 use radiometry::beam::{Beam, Moments};
 
 use crate::basis::Basis;
@@ -103,9 +105,65 @@ impl Bound {
     }
 }
 
+/// What was found out of one bound: a grid asks the same of a circle's every direction, and an answer
+/// takes dozens of exponentials.
+#[derive(Debug, Default)]
+pub(crate) struct Known {
+    /// By the bits of θ and the degree that a rule is exact to; `None` of the point.
+    errors: HashMap<(u64, Option<usize>), f64>,
+}
+
+impl Known {
+    /// As [`Bound::of_point`].
+    pub(crate) fn of_point(&mut self, bound: &Bound, theta_rad: f64) -> f64 {
+        self.or_else((theta_rad.to_bits(), None), || bound.of_point(theta_rad))
+    }
+
+    /// As [`Bound::of_rule`].
+    pub(crate) fn of_rule(&mut self, bound: &Bound, theta_rad: f64, degree: usize) -> f64 {
+        self.or_else((theta_rad.to_bits(), Some(degree)), || bound.of_rule(theta_rad, degree))
+    }
+
+    fn or_else(&mut self, asked: (u64, Option<usize>), find: impl FnOnce() -> f64) -> f64 {
+        if self.errors.len() >= KNOWN_MAX {
+            self.errors.clear();
+        }
+        *self.errors.entry(asked).or_insert_with(find)
+    }
+}
+
+/// Errors that are remembered; beyond it they are forgotten, so that memory doesn't grow with readings
+/// that share no θ.
+const KNOWN_MAX: usize = 1 << 14;
 /// Sizes Λ that are tried.
 const STEPS: u32 = 24;
 /// Of the size at which the bound has no value.
 const LIMIT: f64 = 0.98;
 /// An arc over its slope, squared, and more: slopes are small.
 const SLENDER: f64 = 1.01;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::BasisSpec;
+
+    #[test]
+    fn what_is_remembered_is_what_the_bound_says_of_that_direction_and_rule() {
+        let beam = Beam::of_spot(0.00625, 0.0025, 0.3).unwrap();
+        let region = Region::surface((-0.05, 0.05), (-0.05, 0.05), 1.4);
+        let basis = Basis::new(BasisSpec::zernike(6, 2), region).unwrap();
+        let (bound, mut known) = (Bound::new(&beam, &basis).unwrap(), Known::default());
+        // More than are remembered, and each asked again.
+        let thetas: Vec<f64> = (0..KNOWN_MAX).map(|i| i as f64 * 1.3 / KNOWN_MAX as f64).collect();
+        for theta_rad in thetas.iter().flat_map(|theta_rad| [*theta_rad; 2]) {
+            assert_eq!(known.of_point(&bound, theta_rad), bound.of_point(theta_rad));
+            for degree in [1, 5] {
+                let found = known.of_rule(&bound, theta_rad, degree);
+                assert_eq!(found, bound.of_rule(theta_rad, degree));
+            }
+            assert!(known.errors.len() <= KNOWN_MAX);
+        }
+        assert_ne!(known.of_rule(&bound, 0.0, 1), known.of_rule(&bound, 1.0, 1));
+        assert_ne!(known.of_rule(&bound, 1.0, 1), known.of_rule(&bound, 1.0, 5));
+    }
+}

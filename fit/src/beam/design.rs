@@ -10,7 +10,7 @@
 
 use radiometry::quadrature::Sum;
 
-use super::bound::Bound;
+use super::bound::{Bound, Known};
 use super::{Averager, Cover, Means, Optics, way};
 use crate::basis::{Basis, Scratch, dot};
 use crate::weights::Model;
@@ -297,14 +297,19 @@ impl Averager {
     }
 
     /// The coarsest rule for a beam that nothing cuts, and what it may err by.
-    fn rule_within(&self, bound: &Bound, theta_rad: f64, allowed: f64) -> (Kind, f64) {
-        let point = bound.of_point(theta_rad);
+    fn rule_within(
+        &self,
+        (bound, known): (&Bound, &mut Known),
+        theta_rad: f64,
+        allowed: f64,
+    ) -> (Kind, f64) {
+        let point = known.of_point(bound, theta_rad);
         if point <= allowed {
             return (Kind::Point, point);
         }
         let mut last = (Kind::Point, point);
         for (i, rule) in self.smooth.iter().enumerate() {
-            last = (Kind::Smooth(i), bound.of_rule(theta_rad, rule.degree));
+            last = (Kind::Smooth(i), known.of_rule(bound, theta_rad, rule.degree));
             if last.1 <= allowed {
                 break;
             }
@@ -412,13 +417,16 @@ struct Choice<'b> {
     coarser: Vec<f64>,
     /// The largest value of each function.
     largest: Vec<f64>,
+    /// Of the averager's bound.
+    known: Known,
 }
 
 impl<'b> Choice<'b> {
     fn new(basis: &'b Basis) -> Self {
         let room = || vec![0.0; basis.len()];
         let largest = (0..basis.len()).map(|k| basis.largest(k)).collect();
-        Self { basis, means: Means::new(basis), row: room(), coarser: room(), largest }
+        let (means, known) = (Means::new(basis), Known::default());
+        Self { basis, means, row: room(), coarser: room(), largest, known }
     }
 
     /// The rule for a ray, and what it errs by, as a part of the field's size.
@@ -426,7 +434,9 @@ impl<'b> Choice<'b> {
         match averager.cover(ray) {
             Cover::Off => (Kind::Off, 0.0),
             Cover::Within => match &averager.bound {
-                Some(bound) => averager.rule_within(bound, ray.theta_rad, allowed),
+                Some(bound) => {
+                    averager.rule_within((bound, &mut self.known), ray.theta_rad, allowed)
+                }
                 None => self.compared(averager, ray, allowed, Kind::SMOOTH),
             },
             Cover::Across => self.compared(averager, ray, allowed, Kind::ACROSS),
@@ -441,7 +451,7 @@ impl<'b> Choice<'b> {
         allowed: f64,
         kinds: &[Kind],
     ) -> (Kind, f64) {
-        let Self { basis, means, row, coarser, largest } = self;
+        let Self { basis, means, row, coarser, largest, .. } = self;
         let mut last = (kinds[0], f64::INFINITY);
         averager.row(last.0, ray, basis, means, row);
         for kind in &kinds[1..] {
