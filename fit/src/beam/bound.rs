@@ -156,14 +156,16 @@ mod tests {
         // More than are remembered, and each asked again.
         let thetas: Vec<f64> = (0..KNOWN_MAX).map(|i| i as f64 * 1.3 / KNOWN_MAX as f64).collect();
         for theta_rad in thetas.iter().flat_map(|theta_rad| [*theta_rad; 2]) {
-            assert_eq!(known.of_point(&bound, theta_rad), bound.of_point(theta_rad));
+            let found = known.of_point(&bound, theta_rad);
+            assert_eq!(found.to_bits(), bound.of_point(theta_rad).to_bits());
             for degree in [1, 5] {
                 let found = known.of_rule(&bound, theta_rad, degree);
-                assert_eq!(found, bound.of_rule(theta_rad, degree));
+                assert_eq!(found.to_bits(), bound.of_rule(theta_rad, degree).to_bits());
             }
             assert!(known.errors.len() <= KNOWN_MAX);
         }
-        assert_ne!(known.of_rule(&bound, 0.0, 1), known.of_rule(&bound, 1.0, 1));
-        assert_ne!(known.of_rule(&bound, 1.0, 1), known.of_rule(&bound, 1.0, 5));
+        let mut bits = |theta_rad, degree| known.of_rule(&bound, theta_rad, degree).to_bits();
+        assert_ne!(bits(0.0, 1), bits(1.0, 1));
+        assert_ne!(bits(1.0, 1), bits(1.0, 5));
     }
 }
