@@ -1,13 +1,14 @@
 //! Where the region as a whole is brightest: the largest intensity and its direction. The value's u
-//! is that of the intensity in that direction, as the first order of a maximum knows no place; the
-//! direction's is by Newton's step: δ = -H⁻¹ δ∇I.
+//! is that of the intensity in that direction, as the first order of a maximum knows no place; how well
+//! the direction is known [`crate::pointing`] tells.
 
 use super::sum::Node;
 use super::{DeriveError, Derived, Field, Remark};
+use crate::pointing::{Pointing, STENCIL_RAD, tangents};
 use crate::{Estimate, Functional};
 use glam::DVec3;
 use radiometry::direction::{angles, unit};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
 /// The largest intensity within the cone that was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +57,14 @@ impl Field<'_> {
             intensity.remarks.push(Remark::AtRim);
         }
         let (u_theta_rad, u_across_rad) =
-            if is_at_rim { None } else { self.u_direction(peak)? }.unzip();
+            if is_at_rim { None } else { self.pointing(peak)? }.unzip();
         Ok(PeakIntensity { intensity, theta_rad, phi_rad, u_theta_rad, u_across_rad })
+    }
+
+    /// Of the peak's direction, along growing θ and across; `None` where the top is no hill.
+    fn pointing(&self, peak: DVec3) -> Result<Option<(f64, f64)>, DeriveError> {
+        let known = self.fit.pointing_of(peak, |towards| self.over_area(towards))?;
+        Ok(known.map(|Pointing { u_theta_rad, u_across_rad }| (u_theta_rad, u_across_rad)))
     }
 
     fn cone_end_rad(&self) -> f64 {
@@ -138,36 +145,6 @@ impl Field<'_> {
         }
         Ok((place, value))
     }
-
-    /// Of the peak's direction, along growing θ and across; `None` where the top is no hill.
-    fn u_direction(&self, peak: DVec3) -> Result<Option<(f64, f64)>, DeriveError> {
-        let (along, across) = tangents(peak);
-        let h = STENCIL_RAD;
-        let at = |a: f64, b: f64| self.over_area((peak + a * along + b * across).normalize());
-        let (up, down, left, right) = (at(h, 0.0)?, at(-h, 0.0)?, at(0.0, -h)?, at(0.0, h)?);
-        let value = |functional: &Functional| self.fit.of_value(functional);
-        let here = value(&at(0.0, 0.0)?);
-        let haa = (value(&up) - 2.0 * here + value(&down)) / (h * h);
-        let hbb = (value(&right) - 2.0 * here + value(&left)) / (h * h);
-        let (pp, pm, mp, mm) = (at(h, h)?, at(h, -h)?, at(-h, h)?, at(-h, -h)?);
-        let hab = (value(&pp) - value(&pm) - value(&mp) + value(&mm)) / (4.0 * h * h);
-        let determinant = haa * hbb - hab * hab;
-        if !(haa < 0.0 && determinant > FLAT * haa * hbb) {
-            return Ok(None);
-        }
-        let (da, db) =
-            (up.plus(-1.0, &down).times(0.5 / h), right.plus(-1.0, &left).times(0.5 / h));
-        let u_along = da.clone().times(-hbb / determinant).plus(hab / determinant, &db);
-        let u_across = da.times(hab / determinant).plus(-haa / determinant, &db);
-        Ok(Some((self.fit.of(&u_along).u, self.fit.of(&u_across).u)))
-    }
-}
-
-/// Unit vectors along growing θ and φ; at the pole along x and y.
-fn tangents(place: DVec3) -> (DVec3, DVec3) {
-    let (theta_rad, phi_rad) = angles(place);
-    let along = unit(theta_rad + FRAC_PI_2, phi_rad);
-    (along, place.cross(along))
 }
 
 /// A direction a step away.
@@ -183,8 +160,4 @@ const RINGS_MAX: usize = 180;
 /// Lobes that are climbed.
 const LOBES: usize = 8;
 const STEP_LAST_RAD: f64 = 1e-6;
-/// The step of differences.
-const STENCIL_RAD: f64 = 1e-3;
-/// Of the product of the curvatures: a ridge that is flatter has no peak in the other direction.
-const FLAT: f64 = 1e-6;
 const TIE_U: f64 = 2.0;
