@@ -87,7 +87,7 @@ fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
     let share = bench.gonio(&["fit", "--merge", &share, "--json"]).well().json();
     let whole = ["fit", "long.csv", "--angular-degree=4", "--position-degree=0", "--json"];
     let whole = bench.gonio(&whole).well().json();
-    assert_eq!(whole["notes"][1], "read in blocks, no sample kept");
+    assert_eq!(whole["notes"][1], "read in blocks, its samples not all in memory at once");
     assert_eq!(whole["notes"].as_array().unwrap().len(), 2, "{}", whole["notes"]);
     for key in ["coefficients", "covariance", "residual_rms", "n_used", "dof"] {
         assert_close(&share[key], &whole[key], 1e-6);
@@ -119,7 +119,7 @@ fn outliers_and_limits_weigh_in_blocks_as_in_memory() {
         let robust = ["fit", "spoilt.csv", "--robust", robust];
         let kept = bench.gonio(&[&robust, &pinned[..]].concat()).well().json();
         let blocks = bench.gonio(&[&robust, &pinned[..], &["--in-blocks"]].concat()).well().json();
-        assert_eq!(blocks["notes"][1], "read in blocks, no sample kept");
+        assert_eq!(blocks["notes"][1], "read in blocks, its samples not all in memory at once");
         assert_same(&blocks, &kept);
         let counts = |why: &str| blocks["readings"][why].as_u64().unwrap();
         assert!(counts("limit_holding") > 100 && counts("limit_exceeded") > 0);
@@ -163,7 +163,7 @@ fn a_run_in_blocks_is_the_run_at_once() {
         let kept = bench.gonio(&[&fit[..], &["kept.json"]].concat()).well().json();
         let blocks = [&fit[..], &["blocks.json", "--in-blocks"]].concat();
         let blocks = bench.gonio(&blocks).well().json();
-        assert_eq!(blocks["notes"][0], "read in blocks, no sample kept");
+        assert_eq!(blocks["notes"][0], "read in blocks, its samples not all in memory at once");
         assert_same(&blocks, &kept);
         assert!(blocks["n_used"].as_u64().unwrap() > 1024, "{}", blocks["n_used"]);
         assert_eq!(blocks["truth"]["exitance_w_per_m2"], kept["truth"]["exitance_w_per_m2"]);

@@ -48,7 +48,7 @@ fn a_run_that_ends_in_blocks_leaves_the_files_of_one_that_is_kept() {
     bench.gonio(&["run", "plan.toml", "--out", "kept"]).well();
     let said = bench.gonio(&["run", "plan.toml", "--out", "out", "--in-blocks", "--json"]);
     let said = said.well().json();
-    assert_eq!(said["notes"][0], "read in blocks, no sample kept");
+    assert_eq!(said["notes"][0], "read in blocks, its samples not all in memory at once");
     let [samples, readings, accuracy] = ["samples.csv", "readings.csv", "accuracy.csv"]
         .map(|file| [bench.text(&format!("out/{file}")), bench.text(&format!("kept/{file}"))]);
     assert!(rows(&samples[1]).len() > 1024, "{} lines", rows(&samples[1]).len());
@@ -84,7 +84,7 @@ fn a_run_that_ends_in_blocks_leaves_the_files_of_one_that_is_kept() {
     }
     // All of the few samples are shown.
     let report = bench.text("out/report.html");
-    assert!(report.contains("A long run: read in blocks"), "{}", report.len());
+    assert!(report.contains("The run was read in blocks"), "{}", report.len());
     assert!(!report.contains("pictures and the table of flagged readings are of"));
 }
 

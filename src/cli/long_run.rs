@@ -23,7 +23,7 @@ use crate::rig::calibration::{
 /// A run of more readings is read in blocks, by `gonio fit` and at its end: of this many all that is made of
 /// them takes half a gigabyte.
 const RUN_KEPT_MAX: u64 = 200_000;
-pub(super) const IN_BLOCKS: &str = "read in blocks, no sample kept";
+pub(super) const IN_BLOCKS: &str = "read in blocks, its samples not all in memory at once";
 /// Where others than the chosen functions are not fitted.
 pub(super) const NOT_DOUBTED: &str = "u has no part for what other bases make of directions where nothing was measured (extrapolation): \
      that takes all samples at once";

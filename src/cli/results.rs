@@ -132,7 +132,7 @@ impl Results {
         setup: &Setup,
         record: &RunRecord<'_>,
     ) -> Result<(), ExportError> {
-        let RunRecord { header, reader, .. } = *record;
+        let RunRecord { header, reader, .. } = record;
         let quantity = setup.rig.detector.quantity;
         write_atomically(&folder.join("samples.csv"), |out| {
             self.write_samples(out, setup, reader)

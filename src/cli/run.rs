@@ -89,15 +89,7 @@ pub(crate) fn finish(
         Err(_) if !is_as_planned => return Err(interrupted(folder, &outcome)),
         results => results?,
     };
-    let (header, sessions, events) = (reader.header()?, reader.sessions()?, reader.events()?);
-    let record = RunRecord {
-        header: &header,
-        reader,
-        readings: &readings,
-        sessions: &sessions,
-        events: &events,
-    };
-    results.write(folder, setup, &record)?;
+    results.write(folder, setup, &RunRecord::of(reader, readings)?)?;
     let closed = journal.close();
     let summary = Summary {
         folder,

@@ -203,16 +203,9 @@ impl Workshop for Shop {
 
 impl Shop {
     fn evaluate(&self, folder: &Path) -> Result<Finished, Failure> {
-        let (setup, header, reader) = open_run(folder)?;
+        let (setup, _, reader) = open_run(folder)?;
         let (results, readings) = Results::of_run(&setup, &reader, false)?;
-        let (sessions, events) = (reader.sessions()?, reader.events()?);
-        let record = RunRecord {
-            header: &header,
-            reader: &reader,
-            readings: &readings,
-            sessions: &sessions,
-            events: &events,
-        };
+        let record = RunRecord::of(&reader, readings)?;
         results.write(folder, &setup, &record)?;
         let (measured, planned) = (results.tally.measured, targets_planned(&setup));
         let fit = match &results.fitted {
@@ -223,7 +216,7 @@ impl Shop {
             }
             Err(error) => format!("no fit: {error}"),
         };
-        let rule = rule_met(&sessions);
+        let rule = rule_met(&record.sessions);
         let missed = stopping::missed(&setup, &results).or_else(|| adapting::missed(&setup));
         let mut summary = format!("{measured} of {planned} targets measured; {fit}");
         if let Some(rule) = &rule {

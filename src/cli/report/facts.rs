@@ -32,7 +32,7 @@ pub(super) fn facts(
     results: &Results,
     record: &RunRecord<'_>,
 ) -> Vec<(String, String)> {
-    let header = record.header;
+    let header = &record.header;
     let words = Words::of(setup.rig.detector.quantity);
     let simulated = if header.simulated { " (simulated)" } else { "" };
     let mut facts = vec![
@@ -164,7 +164,7 @@ pub(super) fn notes(setup: &Setup, results: &Results) -> Vec<String> {
     }
     let remarks = results.remarks();
     if !remarks.is_empty() {
-        notes.push(format!("A long run: {}.", remarks.join("; ")));
+        notes.push(format!("The run was {}.", remarks.join("; ")));
     }
     let Ok(fitted) = &results.fitted else { return notes };
     let fit = &fitted.fit;

@@ -23,7 +23,7 @@ use super::setup::Setup;
 use super::summary::unseen_in_words;
 use super::text::{row, table};
 use crate::export::write_atomically;
-use crate::journal::{Event, Header, Reader, Session};
+use crate::journal::{Event, Header, JournalError, Reader, Session};
 use crate::report::{Report, Section};
 use crate::rig::Reading;
 
@@ -31,29 +31,30 @@ use crate::rig::Reading;
 pub(crate) const REPORT: &str = "report.html";
 
 /// What a run's journal says of it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct RunRecord<'a> {
-    pub(crate) header: &'a Header,
+    pub(crate) header: Header,
     /// Has its readings, whatever their number.
     pub(crate) reader: &'a Reader,
     /// Of a run in blocks those beside its targets'.
-    pub(crate) readings: &'a [Reading],
-    pub(crate) sessions: &'a [Session],
-    pub(crate) events: &'a [Event],
+    pub(crate) readings: Vec<Reading>,
+    pub(crate) sessions: Vec<Session>,
+    pub(crate) events: Vec<Event>,
+}
+
+impl<'a> RunRecord<'a> {
+    /// With the readings that came with the run's results.
+    pub(crate) fn of(reader: &'a Reader, readings: Vec<Reading>) -> Result<Self, JournalError> {
+        let (header, sessions, events) = (reader.header()?, reader.sessions()?, reader.events()?);
+        Ok(Self { header, reader, readings, sessions, events })
+    }
 }
 
 /// Renders a run's report again.
 pub(crate) fn report(args: &ReportArgs) -> Outcome {
-    let (setup, header, reader) = open_run(&args.dir)?;
-    let (sessions, events) = (reader.sessions()?, reader.events()?);
+    let (setup, _, reader) = open_run(&args.dir)?;
     let (results, readings) = Results::of_run(&setup, &reader, false)?;
-    let record = RunRecord {
-        header: &header,
-        reader: &reader,
-        readings: &readings,
-        sessions: &sessions,
-        events: &events,
-    };
+    let record = RunRecord::of(&reader, readings)?;
     let report = of(&setup, &results, &record);
     let output = args.output.clone().unwrap_or_else(|| args.dir.join(REPORT));
     if output == Path::new("-") {
@@ -67,8 +68,8 @@ pub(crate) fn report(args: &ReportArgs) -> Outcome {
     let names: Vec<&str> = report.pictures().map(|picture| picture.name).collect();
     if args.json {
         say_json(&json!({
-            "run": header.plan_name,
-            "simulated": header.simulated,
+            "run": record.header.plan_name,
+            "simulated": record.header.simulated,
             "report": output.display().to_string(),
             "pictures": names,
         }))?;
@@ -121,7 +122,7 @@ pub(crate) fn of(setup: &Setup, results: &Results, record: &RunRecord<'_>) -> Re
         }),
     }
     sections.extend(adapting::section(setup));
-    sections.extend(course::signal(setup, results, record.readings, length_s));
+    sections.extend(course::signal(setup, results, &record.readings, length_s));
     sections.extend(flagged::section(setup, results));
     sections.extend(flagged::effects(setup));
     Report {
