@@ -15,12 +15,16 @@ const SIGMA: f64 = 2e-4;
 
 /// Readings of a field that is the same everywhere and all round.
 fn readings(field: impl Fn(f64) -> f64, die: &mut Die) -> Vec<Sample> {
+    readings_along(&raster_rays(&REGION, 10, 16, 1), field, die)
+}
+
+fn readings_along(rays: &[Ray], field: impl Fn(f64) -> f64, die: &mut Die) -> Vec<Sample> {
     let noise = Noise::Fixed { variance: SIGMA * SIGMA };
     let sample = |ray: &Ray| {
         let value = field(ray.theta_rad) + SIGMA * die.normal();
         Sample { ray: *ray, value, noise }
     };
-    raster_rays(&REGION, 10, 16, 1).iter().map(sample).collect()
+    rays.iter().map(sample).collect()
 }
 
 fn plain(samples: &[Sample], common: &[Common]) -> Fit {
@@ -75,6 +79,30 @@ fn where_the_basis_limits_intervals_hold_the_truth_and_are_not_huge() {
         let rms = (squares / with.len() as f64).sqrt();
         assert!(u[u.len() / 2] <= 2.0 * rms, "{quantity}: median u {}, rms {rms}", u[u.len() / 2]);
     }
+}
+
+#[test]
+fn what_two_priors_say_beyond_the_readings_is_mixed() {
+    // Lamps with an edge: about as many readings bear out a smooth prior as a rough one, and what the
+    // two say of directions between rings and beyond them differs by far.
+    let rays = raster_rays(&REGION, 10, 32, 1);
+    let mut off = Vec::new();
+    for seed in 0..40_u32 {
+        let part = |irrational: f64| (f64::from(seed) * irrational).fract();
+        let (at, wide) = (0.5 + 0.7 * part(0.618_034), 0.03 + 0.12 * part(0.754_877));
+        let lamp = |theta_rad: f64| 0.1 + 1.0 / (1.0 + libm::exp((theta_rad - at) / wide));
+        let samples = readings_along(&rays, lamp, &mut Die::new(u64::from(seed)));
+        let fit = fit::fit(&samples, &REGION, BasisSpec::zernike(12, 0), &[]).unwrap();
+        let found = fit.with_truncation(&samples, &[], &[], None).unwrap().exitance();
+        // By the midpoint rule in sin², 1e-6 of it.
+        let truth = PI / 20_000.0
+            * (0..20_000)
+                .map(|i| lamp(libm::asin(libm::sqrt((f64::from(i) + 0.5) / 20_000.0))))
+                .sum::<f64>();
+        off.push((found.value - truth) / found.u);
+    }
+    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
+    assert!((0.4..1.1).contains(&rms) && off.iter().all(|off| off.abs() < 2.5), "{rms} {off:.1?}");
 }
 
 #[test]

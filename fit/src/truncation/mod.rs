@@ -3,8 +3,9 @@
 //! Beside the reported fit stands a wider model of the same readings: the fit's functions, as free as
 //! they are in the fit, and harmonics on the sphere beyond them, held by a prior in which one of degree
 //! n has the variance (1 + n)^(-2 power)/λ: a field that varies as much everywhere. Power and λ are those
-//! under which the readings are likeliest (restricted maximum likelihood, as for [`crate::choose`]). The
-//! same prior then holds the fit's own polynomials too where the fit itself holds nothing against them:
+//! under which the readings are likeliest (restricted maximum likelihood, as for [`crate::choose`]); what
+//! a smoother and a rougher prior say is mixed, as far as the readings bear each out, since between
+//! readings and beyond them they differ by far more than what tells them apart. The same prior then holds the fit's own polynomials too where the fit itself holds nothing against them:
 //! free, they would run away where nothing was measured. Given the readings, the field is then
 //! normal about the wider model's mean with its covariance Σ, and the reported fit lies off that mean
 //! by a known field. A linear functional f of the reported fit has the mean square error
