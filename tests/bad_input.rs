@@ -208,6 +208,8 @@ fn samples_from_elsewhere_are_refused_by_line_and_column() {
     refused(&bench, &degree, &["--angular-degree: splines have no degree"]);
     let spans = ["fit", "s.csv", "--theta-spans", "9", "--phi-spans", "8", "--fine-spans", "3,2,1"];
     refused(&bench, &spans, &["--fine-spans: no stretch of 9 spans", "FIRST < AFTER_LAST"]);
+    let patch = [&spans[..6], &["--fine-spans", "3,5,1", "--fine-phi-spans", "2,11,1"]].concat();
+    refused(&bench, &patch, &["--fine-phi-spans: no stretch of 9 spans of theta and 8 of phi"]);
     let spans = ["fit", "s.csv", "--theta-spans", "9"];
     refused(&bench, &spans, &["--phi-spans"]);
     let columns = ["fit", "s.csv", "--cosine-columns", "2"];

@@ -42,7 +42,7 @@
 //! # Ok::<(), fit::FitError>(())
 //! ```
 
-pub use basis::{Angular, BasisSpec, Fine, Position};
+pub use basis::{Angular, Around, BasisSpec, Fine, Position};
 pub use beam::design::BeamRows;
 pub use beam::{Optics, Outline};
 pub use chart::{Chart, Face};

@@ -305,7 +305,7 @@ mod tests {
 
     #[test]
     fn refined_splines_are_looked_at_finely_where_they_are_fine() {
-        let fine = Fine { from: 0, to: 1, halvings: 4 };
+        let fine = Fine { from: 0, to: 1, halvings: 4, ..Fine::NONE };
         let splines = Angular::Splines { theta_spans: 6, phi_spans: 6, fine };
         let fit = undershooting(splines);
         let (held, bound) = fit.nonnegative().unwrap();

@@ -139,9 +139,12 @@ fn bends(angular: Angular, region: &Region) -> (f64, f64) {
         // A quarter turn of θ is half a turn of theirs.
         Angular::Hemispherical { degree } => (period(degree) / 2.0, period(degree)),
         Angular::Splines { theta_spans, phi_spans, fine } => {
-            let halvings = if fine.is_none() { 0 } else { fine.halvings.min(52) };
-            let narrowest = theta_spans.max(1) as f64 * (1_u64 << halvings) as f64;
-            (PI / narrowest, 2.0 * TAU / phi_spans.max(1) as f64)
+            let narrowest = |spans: usize, halvings: usize| {
+                let halvings = if fine.is_none() { 0 } else { halvings.min(52) };
+                spans.max(1) as f64 * (1_u64 << halvings) as f64
+            };
+            let along = narrowest(theta_spans, fine.halvings);
+            (PI / along, 2.0 * TAU / narrowest(phi_spans, fine.around.halvings))
         }
     }
 }

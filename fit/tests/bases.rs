@@ -5,19 +5,29 @@
 mod scenes;
 
 use fit::{
-    Angular, BasisSpec, Fine, Fit, Noise, Penalised, Penalty, Position, Ray, Region, Sample,
+    Angular, Around, BasisSpec, Fine, Fit, Noise, Penalised, Penalty, Position, Ray, Region, Sample,
 };
 use radiometry::quadrature::cone;
 use scenes::{Die, REGION, exact, spread_rays};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-const ANGULAR: [Angular; 6] = [
+const ANGULAR: [Angular; 7] = [
     Angular::Zernike { degree: 5, cosine_columns: 0 },
     Angular::Zernike { degree: 5, cosine_columns: 3 },
     Angular::Hemispherical { degree: 3 },
     Angular::EvenHarmonics { degree: 5 },
-    Angular::Splines { theta_spans: 5, phi_spans: 9, fine: Fine { from: 1, to: 3, halvings: 2 } },
+    Angular::Splines {
+        theta_spans: 5,
+        phi_spans: 9,
+        fine: Fine { from: 1, to: 3, halvings: 2, ..Fine::NONE },
+    },
     Angular::Spherical { degree: 4 },
+    // Its patch goes through φ = 0.
+    Angular::Splines {
+        theta_spans: 5,
+        phi_spans: 9,
+        fine: Fine { from: 3, to: 5, halvings: 1, around: Around { from: 7, to: 11, halvings: 2 } },
+    },
 ];
 const POSITION: [Position; 3] = [
     Position::Legendre { degree: 0 },
@@ -72,7 +82,8 @@ fn the_exitance_is_the_integral_of_the_values() {
     for (seed, basis) in specs().enumerate() {
         let fit = drawn(basis, seed as u64);
         for theta_max in [0.4, 1.1, FRAC_PI_2] {
-            let nodes = cone(theta_max, 40, 24).unwrap();
+            // Many in φ: those of the patch are 10° wide.
+            let nodes = cone(theta_max, 40, 144).unwrap();
             let mean = |x: f64, y: f64| -> f64 {
                 let at = |n: &radiometry::quadrature::ConeNode| Ray {
                     x_m: 0.02 * x,

@@ -233,14 +233,21 @@ fn splines_that_only_a_file_asks_for_are_counted_before_they_are_made() {
     };
     let begun = std::time::Instant::now();
     for halvings in [0, 8, 40] {
-        let fine = fit::Fine { from: 0, to: usize::MAX, halvings };
+        let fine = fit::Fine { from: 0, to: usize::MAX, halvings, ..fit::Fine::NONE };
         let text = refusal(&good(), &REGION, of(32_768, 32_768, fine));
         says(&text, "coefficients");
     }
     assert!(begun.elapsed().as_secs() < 5);
     // Nor are few ones miscounted.
-    let fine = fit::Fine { from: 2, to: 4, halvings: 3 };
+    let fine = fit::Fine { from: 2, to: 4, halvings: 3, ..fit::Fine::NONE };
     assert_eq!(of(8, 16, fine).len(), 342);
+    // Spans of θ as they are, and of φ halved twice in two of five bands, which have 16 round them.
+    let around = fit::Around { from: 14, to: 18, halvings: 2 };
+    let patch = fit::Fine { from: 6, to: 8, around, ..fit::Fine::NONE };
+    let more = of(8, 16, patch).len() - of(8, 16, fit::Fine::NONE).len();
+    assert_eq!(more, 3 * 4 * 3);
+    let around = fit::Around { halvings: 40, ..around };
+    says(&refusal(&good(), &REGION, of(8, 16, fit::Fine { around, ..patch })), "coefficients");
 }
 
 #[test]

@@ -218,11 +218,21 @@ fn basis_in_words(basis: BasisSpec) -> String {
         Angular::Splines { theta_spans, phi_spans, fine } => {
             let spans =
                 format!("splines of {theta_spans} spans in θ, {phi_spans} round the horizon");
-            let parts = 1_u64 << fine.halvings.min(52);
-            let deg = |span: usize| 90.0 * span as f64 / theta_spans as f64;
-            let (from, to) = (deg(fine.from), deg(fine.to));
-            let finer = format!("{spans}, {parts} times as fine from {from:.0}° to {to:.0}°");
-            if fine.is_none() { spans } else { finer }
+            let deg = |span: usize, spans: usize, whole: f64| whole * span as f64 / spans as f64;
+            let times = |halvings: usize| 1_u64 << halvings.min(52);
+            let (from, to) = (deg(fine.from, theta_spans, 90.0), deg(fine.to, theta_spans, 90.0));
+            let finer = times(fine.halvings);
+            let along = format!("{spans}, {finer} times as fine from {from:.0}° to {to:.0}°");
+            let around = fine.around;
+            if fine.is_none() {
+                spans
+            } else if around.is_none() {
+                along
+            } else {
+                let at = |span| deg(span, phi_spans, 360.0);
+                let (finer, from, to) = (times(around.halvings), at(around.from), at(around.to));
+                format!("{along}, there in φ {finer} times from {from:.0}° to {to:.0}°")
+            }
         }
     };
     match basis.position {

@@ -60,14 +60,21 @@ pub(super) fn wished(args: &FitArgs, plan: Wish) -> Result<Wish, Failure> {
 /// The spans of splines in direction that the command line pins.
 fn spans(args: &FitArgs) -> Result<Option<Spans>, Failure> {
     let (Some(theta), Some(phi)) = (args.theta_spans, args.phi_spans) else { return Ok(None) };
+    let around = args.fine_phi_spans.as_deref();
     let fine = match &args.fine_spans {
         None => Fine::NONE,
-        Some(numbers) => Fine::of(numbers, theta).ok_or_else(|| {
-            Failure::with_help(
+        Some(numbers) => Fine::of(numbers, around, (theta, phi)).ok_or_else(|| match around {
+            None => Failure::with_help(
                 format!("--fine-spans: no stretch of {theta} spans of theta"),
                 "expected FIRST,AFTER_LAST,HALVINGS: whole numbers, FIRST < AFTER_LAST <= spans of theta, \
                  1 to 8 halvings, as fine_spans of the choice in fit.json",
-            )
+            ),
+            Some(_) => Failure::with_help(
+                format!("--fine-phi-spans: no stretch of {theta} spans of theta and {phi} of phi"),
+                "expected FIRST,AFTER_LAST,HALVINGS of both: whole numbers, of phi FIRST < spans of phi \
+                 and no more than a full turn, 1 to 8 halvings, of theta as --fine-spans alone, 0 to 8 \
+                 halvings",
+            ),
         })?,
     };
     Ok(Some(Spans { theta, phi, fine }))

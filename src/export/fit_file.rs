@@ -250,6 +250,8 @@ fn basis(spec: BasisSpec, functions: Option<Vec<String>>) -> Value {
         "theta_spans": spans.map(|(theta, _)| theta),
         "phi_spans": spans.map(|(_, phi)| phi),
         "fine_spans": fine.map(|fine| json!([fine.from, fine.to, fine.halvings])),
+        "fine_phi_spans": fine.map(|fine| fine.around).filter(|around| !around.is_none())
+            .map(|around| json!([around.from, around.to, around.halvings])),
         "position_degree": spec.position.degree(),
         "position_spans": position_spans,
     });

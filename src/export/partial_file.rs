@@ -11,7 +11,8 @@ use std::io::{self, Write};
 use crc::{CRC_64_XZ, Crc};
 use fit::partial::{Partial, Parts, Sums, Weighting};
 use fit::{
-    Angular, BasisSpec, Chart, Face, Fine, FitError, Optics, Outline, Penalty, Position, Region,
+    Angular, Around, BasisSpec, Chart, Face, Fine, FitError, Optics, Outline, Penalty, Position,
+    Region,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -137,6 +138,9 @@ enum AngularHeader {
         /// First, one after the last, and how often each is halved.
         #[serde(default)]
         fine_spans: [usize; 3],
+        /// The same of φ within.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        fine_phi_spans: [usize; 3],
     },
     Spherical {
         degree: usize,
@@ -346,6 +350,11 @@ fn number(bytes: &[u8]) -> f64 {
     f64::from_le_bytes(bytes.try_into().unwrap_or_default())
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn is_zero(spans: &[usize; 3]) -> bool {
+    *spans == [0; 3]
+}
+
 fn unknown(key: &str, found: &impl ToString) -> PartialFileError {
     PartialFileError::Header(format!("{key} {}: this program knows no such", found.to_string()))
 }
@@ -367,7 +376,9 @@ impl BasisHeader {
             Angular::EvenHarmonics { degree } => AngularHeader::EvenHarmonics { degree },
             Angular::Splines { theta_spans, phi_spans, fine } => {
                 let fine_spans = [fine.from, fine.to, fine.halvings];
-                AngularHeader::Splines { theta_spans, phi_spans, fine_spans }
+                let Around { from, to, halvings } = fine.around;
+                let fine_phi_spans = [from, to, halvings];
+                AngularHeader::Splines { theta_spans, phi_spans, fine_spans, fine_phi_spans }
             }
             Angular::Spherical { degree } => AngularHeader::Spherical { degree },
             Angular::SecondPlane { degree } => AngularHeader::SecondPlane { degree },
@@ -386,9 +397,12 @@ impl BasisHeader {
             }
             AngularHeader::Hemispherical { degree } => Angular::Hemispherical { degree },
             AngularHeader::EvenHarmonics { degree } => Angular::EvenHarmonics { degree },
-            AngularHeader::Splines { theta_spans, phi_spans, fine_spans } => {
+            AngularHeader::Splines { theta_spans, phi_spans, fine_spans, fine_phi_spans } => {
+                let [from, to, halvings] = fine_phi_spans;
+                let around = Around { from, to, halvings };
                 let [from, to, halvings] = fine_spans;
-                Angular::Splines { theta_spans, phi_spans, fine: Fine { from, to, halvings } }
+                let fine = Fine { from, to, halvings, around };
+                Angular::Splines { theta_spans, phi_spans, fine }
             }
             AngularHeader::Spherical { degree } => Angular::Spherical { degree },
             AngularHeader::SecondPlane { degree } => Angular::SecondPlane { degree },

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use fit::{AngularKind, Fine, Outline, Spans, Wish};
+use fit::{AngularKind, Around, Fine, Outline, Spans, Wish};
 use spanned_toml::{Document, Problem, Source};
 
 use super::*;
@@ -76,10 +76,16 @@ fn every_key_is_read_in_si_units() {
 fn a_plan_pins_splines() {
     let pins = "theta_spans = 7\nphi_spans = 12\nfine_spans = [0, 2, 3]";
     let plan = read(&FULL.replace("angular_degree = 8", pins)).unwrap();
-    let fine = Fine { from: 0, to: 2, halvings: 3 };
+    let fine = Fine { from: 0, to: 2, halvings: 3, ..Fine::NONE };
     let spans = Some(Spans { theta: 7, phi: 12, fine });
     let kind = Some(AngularKind::Splines);
     assert_eq!(plan.fit, Wish { kind, spans, position_degree: Some(2), ..Wish::default() });
+    // And a patch of directions, through φ = 0.
+    let pins = pins.replace("[0, 2, 3]", "[5, 7, 0]\nfine_phi_spans = [11, 14, 2]");
+    let plan = read(&FULL.replace("angular_degree = 8", &pins)).unwrap();
+    let around = Around { from: 11, to: 14, halvings: 2 };
+    let fine = Fine { from: 5, to: 7, halvings: 0, around };
+    assert_eq!(plan.fit.spans, Some(Spans { theta: 7, phi: 12, fine }));
 }
 
 #[test]
@@ -157,6 +163,17 @@ fn every_mistake_is_named_at_its_line() {
             "angular_degree = 8",
             "theta_spans = 4\nphi_spans = 8\nfine_spans = [2, 5, 1]",
             "fit.fine_spans",
+        ),
+        ("angular_degree = 8", "fine_phi_spans = [0, 1, 1]", "fit.fine_phi_spans"),
+        (
+            "angular_degree = 8",
+            "theta_spans = 4\nphi_spans = 8\nfine_phi_spans = [0, 1, 1]",
+            "fit.fine_phi_spans",
+        ),
+        (
+            "angular_degree = 8",
+            "theta_spans = 4\nphi_spans = 8\nfine_spans = [2, 4, 1]\nfine_phi_spans = [8, 9, 1]",
+            "fit.fine_phi_spans",
         ),
         (
             "angular_degree = 8",

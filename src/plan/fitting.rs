@@ -14,7 +14,7 @@ use super::file::PHI_DEG;
 /// the polynomials in direction, Zernike's unless `basis` says otherwise; `cosine_columns` beside those:
 /// how many further functions cos θ Z(2k,0). Of splines instead `theta_spans` from the normal to the
 /// horizon and `phi_spans` round it, and `fine_spans = [first, after_last, halvings]` where those of θ
-/// are halved. `position_degree`: total degree of the polynomials in x and y, or `position_spans` of
+/// are halved, `fine_phi_spans` where within those of φ are. `position_degree`: total degree of the polynomials in x and y, or `position_spans` of
 /// splines along each side. `penalty_power` and `penalty_strength`: how roughness is held against the
 /// field, see docs/fit.md; 0 for not at all, which is also what a pinned `angular_degree` means without
 /// them. All of these as `choice` in fit.json names them.
@@ -57,24 +57,42 @@ fn read_spans(
     let theta = count("theta_spans", 1..=SPANS_MAX)?;
     let phi = count("phi_spans", 1..=SPANS_MAX)?;
     let fine = table.numbers("fine_spans", Bounds::between(0.0, SPANS_MAX as f64), 3..=3)?;
+    let around = table.numbers("fine_phi_spans", Bounds::between(0.0, SPANS_MAX as f64), 3..=3)?;
     let (Some(theta), Some(phi)) = (theta, phi) else {
-        let (key, other) = match (theta, phi, &fine) {
+        let (key, other) = match (theta, phi, &fine, &around) {
             (Some(_), ..) => ("theta_spans", "phi_spans"),
-            (_, Some(_), _) => ("phi_spans", "theta_spans"),
-            (_, _, Some(_)) => ("fine_spans", "theta_spans and phi_spans"),
+            (_, Some(_), ..) => ("phi_spans", "theta_spans"),
+            (_, _, Some(_), _) => ("fine_spans", "theta_spans and phi_spans"),
+            (.., Some(_)) => ("fine_phi_spans", "theta_spans, phi_spans and fine_spans"),
             _ => return Ok(None),
         };
         let what = format!("{key} without {other}");
         return Err(table.problem(key, &what, other, "add it, or leave both to be chosen"));
     };
-    let fine = fine.map_or(Some(Fine::NONE), |numbers| Fine::of(&numbers, theta));
-    let fine = fine.ok_or_else(|| {
-        table.problem(
+    let Some(numbers) = fine else {
+        if around.is_none() {
+            return Ok(Some(Spans { theta, phi, fine: Fine::NONE }));
+        }
+        let what = "fine_phi_spans without fine_spans";
+        let help = "say in which stretch of theta, or leave both out";
+        return Err(table.problem("fine_phi_spans", what, "fine_spans", help));
+    };
+    if Fine::of(&numbers, None, (theta, phi)).is_none() && around.is_none() {
+        return Err(table.problem(
             "fine_spans",
             "no stretch of the spans of theta",
             "[first, after_last, halvings]: whole numbers, first < after_last <= theta_spans, 1 to 8 \
              halvings",
             "copy fine_spans from the choice in fit.json, or leave it out",
+        ));
+    }
+    let fine = Fine::of(&numbers, around.as_deref(), (theta, phi)).ok_or_else(|| {
+        table.problem(
+            "fine_phi_spans",
+            "no stretch of the spans of phi within one of theta",
+            "[first, after_last, halvings] of both: whole numbers, of phi first < phi_spans and no more \
+             than a full turn, 1 to 8 halvings, of theta as fine_spans alone, 0 to 8 halvings",
+            "copy fine_spans and fine_phi_spans from the choice in fit.json, or leave them out",
         )
     })?;
     Ok(Some(Spans { theta, phi, fine }))

@@ -101,6 +101,12 @@ impl Fnv {
             for number in [theta, phi, fine.from, fine.to, fine.halvings] {
                 self.integer(number as u64);
             }
+            if !fine.around.is_none() {
+                self.bytes(b"spans of phi");
+                for number in [fine.around.from, fine.around.to, fine.around.halvings] {
+                    self.integer(number as u64);
+                }
+            }
         }
         if let Some(spans) = wish.position_spans {
             self.bytes(b"spans in position");

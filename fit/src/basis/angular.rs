@@ -106,6 +106,14 @@ impl Directions {
         }
     }
 
+    /// The functions that are zero but for a patch each, if they are.
+    pub(crate) fn local(&self) -> Option<&PolarSplines> {
+        match self {
+            Self::Splines(splines) => Some(splines),
+            _ => None,
+        }
+    }
+
     /// All values in a direction.
     pub(crate) fn evaluate(&self, d: DVec3, room: &mut [f64], out: &mut [f64]) {
         match self {

@@ -19,7 +19,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub(crate) use angular::Directions;
 pub(crate) use place::Places;
 pub(crate) use plane::SecondPlane;
-pub use spec::{Angular, BasisSpec, Fine, Position};
+pub use spec::{Angular, Around, BasisSpec, Fine, Position};
 pub(crate) use splines::{Derivative, PolarSplines};
 
 /// The functions of a spec over a region, ready to be evaluated.
@@ -190,6 +190,16 @@ impl Basis {
 
     /// The value of the field with these coefficients along a ray.
     pub(crate) fn value(&self, coefficients: &[f64], ray: &Ray, scratch: &mut Scratch) -> f64 {
+        if let Some(splines) = self.directions.local() {
+            self.position(ray, scratch);
+            let (width, mut sum) = (self.angular_len(), 0.0);
+            splines.each_along(direction::unit(ray.theta_rad, ray.phi_rad), |j, z| {
+                let places = scratch.position.iter().enumerate();
+                let at: f64 = places.map(|(q, p)| p * coefficients[q * width + j]).sum();
+                sum += at * z;
+            });
+            return sum;
+        }
         self.evaluate(ray, scratch);
         let blocks = coefficients.chunks_exact(scratch.direction.len());
         scratch.position.iter().zip(blocks).map(|(p, c)| p * dot(c, &scratch.direction)).sum()

@@ -1,6 +1,6 @@
 //! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
 
-use super::splines::{Band, PHI_SPANS_MIN, bands, breaks};
+use super::splines::{PHI_SPANS_MIN, bands};
 use crate::{Chart, FitError};
 
 /// Which functions a field is a sum of: every function of direction times every one of position.
@@ -44,7 +44,7 @@ pub enum Angular {
         theta_spans: usize,
         /// Equal spans of φ round the horizon; round the cone θ about sin θ times as many.
         phi_spans: usize,
-        /// Where spans of θ are finer.
+        /// Where spans are finer.
         fine: Fine,
     },
     /// Spherical harmonics up to degree l, (l + 1)² of them: directions all round, of the
@@ -63,12 +63,26 @@ pub enum Angular {
     },
 }
 
-/// A stretch of θ whose spans are halved, for a lobe or an edge that is narrow in θ alone.
+/// A stretch of θ whose spans are halved, for a lobe or an edge that is narrow in θ alone; and of φ,
+/// for one that is narrow both ways.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fine {
     /// The first span of θ that is halved, from 0 at the normal.
     pub from: usize,
     /// The one after the last.
+    pub to: usize,
+    /// How often; 0 where spans of φ alone are halved.
+    pub halvings: usize,
+    /// Where spans of φ are halved within the stretch of θ.
+    pub around: Around,
+}
+
+/// A stretch of φ whose spans are halved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Around {
+    /// The first span round the horizon, from 0 at φ = 0.
+    pub from: usize,
+    /// The one after the last, counted on beyond a full turn where the stretch goes through φ = 0.
     pub to: usize,
     /// How often.
     pub halvings: usize,
@@ -76,28 +90,58 @@ pub struct Fine {
 
 impl Fine {
     /// All spans alike.
+    pub const NONE: Self = Self { from: 0, to: 0, halvings: 0, around: Around::NONE };
+
+    /// Of `[first, after_last, halvings]` among so many spans of θ and, if there is a second list, among
+    /// so many of φ: whole numbers, the first below the second.
+    pub fn of(
+        numbers: &[f64],
+        around: Option<&[f64]>,
+        (theta_spans, phi_spans): (usize, usize),
+    ) -> Option<Self> {
+        let (from, to, halvings) = stretch(numbers)?;
+        let (around, least) = match around {
+            Some(around) => (Around::of(around, phi_spans)?, 0),
+            None => (Around::NONE, 1),
+        };
+        let fine = Self { from, to, halvings, around };
+        let is_sound = to <= theta_spans && (least..=HALVINGS_MAX).contains(&halvings);
+        is_sound.then_some(fine)
+    }
+
+    /// Whether all spans are alike.
+    pub fn is_none(&self) -> bool {
+        self.to <= self.from || (self.halvings == 0 && self.around.is_none())
+    }
+}
+
+impl Around {
+    /// All spans alike.
     pub const NONE: Self = Self { from: 0, to: 0, halvings: 0 };
 
-    /// Of `[first, after_last, halvings]` among so many spans: whole numbers, the first below the second.
-    pub fn of(numbers: &[f64], theta_spans: usize) -> Option<Self> {
-        let whole = |i: usize| {
-            let number = *numbers.get(i)?;
-            let is_whole = number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number);
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just bounded
-            is_whole.then_some(number as usize)
-        };
-        let fine = Self { from: whole(0)?, to: whole(1)?, halvings: whole(2)? };
-        let is_sound = numbers.len() == 3
-            && fine.from < fine.to
-            && fine.to <= theta_spans
-            && (1..=HALVINGS_MAX).contains(&fine.halvings);
-        is_sound.then_some(fine)
+    fn of(numbers: &[f64], phi_spans: usize) -> Option<Self> {
+        let (from, to, halvings) = stretch(numbers)?;
+        let is_sound =
+            from < phi_spans && to - from <= phi_spans && (1..=HALVINGS_MAX).contains(&halvings);
+        is_sound.then_some(Self { from, to, halvings })
     }
 
     /// Whether all spans are alike.
     pub fn is_none(&self) -> bool {
         self.halvings == 0 || self.to <= self.from
     }
+}
+
+/// `[first, after_last, halvings]`: whole numbers, the first below the second.
+fn stretch(numbers: &[f64]) -> Option<(usize, usize, usize)> {
+    let whole = |i: usize| {
+        let number = *numbers.get(i)?;
+        let is_whole = number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just bounded
+        is_whole.then_some(number as usize)
+    };
+    let (from, to, halvings) = (whole(0)?, whole(1)?, whole(2)?);
+    (numbers.len() == 3 && from < to).then_some((from, to, halvings))
 }
 
 /// Functions of the place on the sample.
@@ -182,12 +226,13 @@ impl Angular {
             // Counting the functions of so many spans takes long, and they are too many anyway.
             Self::Splines { theta_spans, phi_spans, fine }
                 if spans(theta_spans, fine) > THETA_SPANS_MAX
-                    || phi_spans > LOCAL_COEFFICIENTS_MAX =>
+                    || phi_spans > LOCAL_COEFFICIENTS_MAX
+                    || fine.around.halvings > HALVINGS_MAX =>
             {
                 usize::MAX
             }
             Self::Splines { theta_spans, phi_spans, fine } => {
-                bands(&breaks(theta_spans, fine), phi_spans).map(Band::len).sum()
+                bands(theta_spans, phi_spans, fine).map(|band| band.len()).sum()
             }
         }
     }

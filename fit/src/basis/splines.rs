@@ -7,8 +7,11 @@
 //! 1 the second; the third holds orders up to 2. From the fourth on, where the splines begin with
 //! θ³, there are splines in φ ("polar splines", after Toshniwal, Speleers, Hiemstra and Hughes
 //! 2017). The sum of those of order 0 and of all others is 1.
+//!
+//! A stretch of θ may have narrower spans, and in it a stretch of φ: every band of θ has breaks of its
+//! own round φ, so that a lobe is followed without a finer mesh all round.
 
-use super::Fine;
+use super::spec::{Around, Fine};
 use glam::DVec3;
 use radiometry::DomainError;
 use radiometry::basis::BSpline;
@@ -20,8 +23,18 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 pub(crate) enum Band {
     /// 1, cos φ, sin φ, cos 2φ, ... from order `first` to `last`.
     Orders { first: usize, last: usize },
-    /// So many periodic B-splines.
-    Local { count: usize },
+    /// Periodic B-splines.
+    Local(Round),
+}
+
+/// The spans of φ of one band: so many equal ones, of which the first of a stretch and those up to its
+/// end (counted on beyond a full turn) are cut into equal parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Round {
+    count: usize,
+    from: usize,
+    to: usize,
+    parts: usize,
 }
 
 impl Band {
@@ -29,13 +42,48 @@ impl Band {
         match self {
             Self::Orders { first: 0, last } => 2 * last + 1,
             Self::Orders { first, last } => 2 * (last + 1 - first),
-            Self::Local { count } => count,
+            Self::Local(round) => round.len(),
         }
     }
 }
 
+impl Round {
+    const fn even(count: usize) -> Self {
+        Self { count, from: 0, to: 0, parts: 1 }
+    }
+
+    /// Of so many equal spans those cut that the stretch, of spans round the horizon, reaches into.
+    fn within(count: usize, around: Around, phi_spans: usize) -> Self {
+        let from = around.from * count / phi_spans.max(1);
+        let to = (around.to * count).div_ceil(phi_spans.max(1)).min(from + count);
+        Self { count, from, to, parts: 1 << around.halvings }
+    }
+
+    fn len(self) -> usize {
+        self.count + (self.to - self.from) * (self.parts - 1)
+    }
+
+    /// Where spans begin and end, from 0 to a full turn.
+    fn breaks(self) -> Vec<f64> {
+        let is_cut = |k: usize| {
+            (self.from..self.to).contains(&k) || (self.from..self.to).contains(&(k + self.count))
+        };
+        let within = (0..self.count).flat_map(|k| {
+            let parts = if is_cut(k) { self.parts } else { 1 };
+            (0..parts).map(move |i| k as f64 + i as f64 / parts as f64)
+        });
+        let turn = |at: f64| TAU * at / self.count as f64;
+        within.chain([self.count as f64]).map(turn).collect()
+    }
+
+    /// The fewest equal spans that are nowhere wider.
+    fn finest(self) -> usize {
+        self.count * if self.to > self.from { self.parts } else { 1 }
+    }
+}
+
 /// Where the spans of θ begin and end.
-pub(crate) fn breaks(theta_spans: usize, fine: Fine) -> Vec<f64> {
+fn breaks(theta_spans: usize, fine: Fine) -> Vec<f64> {
     let spans = theta_spans.max(1);
     let parts = |i: usize| if (fine.from..fine.to).contains(&i) { 1 << fine.halvings } else { 1 };
     let within = (0..spans).flat_map(|i| {
@@ -47,19 +95,31 @@ pub(crate) fn breaks(theta_spans: usize, fine: Fine) -> Vec<f64> {
 
 /// The bands of θ, from the pole; the first one's function of θ is the sum of the first two splines,
 /// the second's the second.
-pub(crate) fn bands(breaks: &[f64], phi_spans: usize) -> impl Iterator<Item = Band> {
+pub(crate) fn bands(
+    theta_spans: usize,
+    phi_spans: usize,
+    fine: Fine,
+) -> impl Iterator<Item = Band> {
+    let breaks = breaks(theta_spans, fine);
     let width = |span: &[f64]| span[1] - span[0];
     let widest = breaks.windows(2).map(width).fold(0.0, f64::max);
+    let edge = |span: usize| FRAC_PI_2 * span as f64 / theta_spans.max(1) as f64;
+    let stretch = edge(fine.from)..=edge(fine.to);
     (0..breaks.len() - 1 + DEGREE).map(move |i| match i {
         0 => Band::Orders { first: 0, last: 0 },
         1 => Band::Orders { first: 1, last: 1 },
         2 => Band::Orders { first: 0, last: 2 },
         _ => {
-            let theta_rad = greville(i, breaks);
-            let round = (libm::sin(theta_rad) * finer(theta_rad, breaks, widest)).min(1.0);
+            let theta_rad = greville(i, &breaks);
+            let is_cut = !fine.around.is_none() && stretch.contains(&theta_rad);
+            // Where a stretch of φ is finer it is that which follows the lobe.
+            let finer = if fine.around.is_none() { finer(theta_rad, &breaks, widest) } else { 1.0 };
+            let round = (libm::sin(theta_rad) * finer).min(1.0);
             let round = libm::round(phi_spans as f64 * round);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small, positive
-            Band::Local { count: (round as usize).max(PHI_SPANS_MIN) }
+            let count = (round as usize).max(PHI_SPANS_MIN);
+            let even = Round::even(count);
+            Band::Local(if is_cut { Round::within(count, fine.around, phi_spans) } else { even })
         }
     })
 }
@@ -87,6 +147,8 @@ pub(crate) struct PolarSplines {
     len: usize,
     breaks: Vec<f64>,
     phi_spans: usize,
+    /// The fewest equal spans of φ that are nowhere wider than the narrowest.
+    phi_finest: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -96,6 +158,23 @@ struct Placed {
     at: usize,
     /// Of [`Band::Local`].
     round: Option<BSpline>,
+    /// ∫ dφ of the functions of [`Band::Local`].
+    turns: Vec<f64>,
+}
+
+impl Placed {
+    /// The spans of φ, where some are cut.
+    fn cut(&self) -> Option<Round> {
+        match self.band {
+            Band::Local(round) if round.to > round.from => Some(round),
+            _ => None,
+        }
+    }
+
+    /// The fewest equal places round the circle that tell its functions apart.
+    fn finest(&self) -> usize {
+        self.cut().map_or(self.band.len(), Round::finest)
+    }
 }
 
 /// A value or a derivative: of this order in θ, and in φ.
@@ -113,17 +192,22 @@ impl PolarSplines {
     ) -> Result<Self, DomainError> {
         let breaks = breaks(theta_spans, fine);
         let mut placed = Vec::with_capacity(breaks.len() + DEGREE);
-        let mut at = 0;
-        for band in bands(&breaks, phi_spans) {
-            let round = match band {
-                Band::Orders { .. } => None,
-                Band::Local { count } => Some(round(count)?),
-            };
-            placed.push(Placed { band, at, round });
+        let (mut at, mut phi_finest) = (0, phi_spans);
+        for band in bands(theta_spans, phi_spans, fine) {
+            let (mut round, mut turns) = (None, Vec::new());
+            if let Band::Local(spans) = band {
+                let splines = BSpline::periodic(DEGREE, &spans.breaks())?;
+                turns.resize(splines.len(), 0.0);
+                let (from, to) = splines.domain();
+                splines.integrals(from, to, &mut turns)?;
+                round = Some(splines);
+                phi_finest = phi_finest.max(spans.finest());
+            }
+            placed.push(Placed { band, at, round, turns });
             at += band.len();
         }
         let theta = BSpline::open(DEGREE, &breaks)?;
-        Ok(Self { theta, bands: placed, len: at, breaks, phi_spans })
+        Ok(Self { theta, bands: placed, len: at, breaks, phi_spans, phi_finest })
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -135,7 +219,7 @@ impl PolarSplines {
         let narrowest = self.breaks.windows(2).map(|two| two[1] - two[0]).fold(FRAC_PI_2, f64::min);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
         let along = libm::ceil(FRAC_PI_2 / narrowest - 1e-6) as usize + DEGREE;
-        along.max(self.phi_spans.div_ceil(2))
+        along.max(self.phi_finest.div_ceil(2))
     }
 
     /// Two polar angles a span of θ, and two azimuths a function that goes round there.
@@ -143,7 +227,7 @@ impl PolarSplines {
         let spans = self.breaks.windows(2).enumerate();
         let rings = spans.flat_map(|(i, span)| {
             // The splines that are not zero over the span.
-            let round = self.bands[i..=i + DEGREE].iter().map(|placed| placed.band.len()).max();
+            let round = self.bands[i..=i + DEGREE].iter().map(Placed::finest).max();
             let round = 2 * round.unwrap_or(1);
             [(span[0], round), (f64::midpoint(span[0], span[1]), round)]
         });
@@ -153,11 +237,17 @@ impl PolarSplines {
     /// All values in a direction; below the horizon those at it.
     pub(crate) fn evaluate_direction(&self, d: DVec3, out: &mut [f64]) {
         out.fill(0.0);
+        self.each_along(d, |k, value| out[k] += value);
+    }
+
+    /// Hands on every function that may not be zero in a direction, some in two parts; below the
+    /// horizon those at it.
+    pub(crate) fn each_along(&self, d: DVec3, hand: impl FnMut(usize, f64)) {
         let theta = libm::atan2(libm::hypot(d.x, d.y), d.z);
         let phi = libm::atan2(d.y, d.x);
         let value = Derivative { theta: 0, phi: 0 };
         // Within the domain by the clamp.
-        let done = self.each(theta, phi, value, |k, value| out[k] += value);
+        let done = self.each(theta, phi, value, hand);
         debug_assert!(done.is_ok(), "a direction has a θ and a φ");
     }
 
@@ -194,7 +284,7 @@ impl PolarSplines {
                         }
                     }
                 }
-                (None, Band::Local { .. }) => {}
+                (None, Band::Local(_)) => {}
             }
         }
         Ok(())
@@ -207,7 +297,7 @@ impl PolarSplines {
             match placed.band {
                 Band::Orders { first: 0, .. } => out[placed.at] = 1.0,
                 Band::Orders { .. } => {}
-                Band::Local { count } => out[placed.at..][..count].fill(1.0),
+                Band::Local(round) => out[placed.at..][..round.len()].fill(1.0),
             }
         }
     }
@@ -240,8 +330,9 @@ impl PolarSplines {
             match placed.band {
                 Band::Orders { first: 0, .. } => out[placed.at] += TAU * over_theta,
                 Band::Orders { .. } => {}
-                Band::Local { count } => {
-                    out[placed.at..][..count].fill(TAU / count as f64 * over_theta);
+                Band::Local(_) => {
+                    let out = out[placed.at..].iter_mut().zip(&placed.turns);
+                    out.for_each(|(out, turn)| *out = turn * over_theta);
                 }
             }
         }
@@ -253,19 +344,37 @@ impl PolarSplines {
     /// the nodes' spans, and close to it elsewhere.
     pub(crate) fn nodes(&self) -> Vec<(f64, f64, f64)> {
         let rule = gauss_legendre(DEGREE + 1);
-        let round = 3 * self.phi_spans.max(2 * PHI_SPANS_MIN);
         let mut nodes = Vec::new();
-        for (low, high) in self.theta.spans() {
+        for (i, (low, high)) in self.theta.spans().enumerate() {
             let (middle, half) = (f64::midpoint(low, high), (high - low) / 2.0);
+            let round = self.nodes_round(&self.bands[i..=i + DEGREE]);
             for (node, weight) in &rule {
                 let theta = middle + half * node;
-                let weight = weight * half * libm::sin(theta) * TAU / round as f64;
-                nodes.extend(
-                    (0..round).map(|k| (theta, TAU * (k as f64 + 0.5) / round as f64, weight)),
-                );
+                let weight = weight * half * libm::sin(theta);
+                nodes.extend(round.iter().map(|(phi, turn)| (theta, *phi, weight * turn)));
             }
         }
         nodes
+    }
+
+    /// Nodes round φ for the functions of these bands: evenly, or where a stretch is finer by a rule in
+    /// each span of the finest band.
+    fn nodes_round(&self, bands: &[Placed]) -> Vec<(f64, f64)> {
+        let cut = bands.iter().filter_map(Placed::cut).max_by_key(|round| round.len());
+        let Some(round) = cut else {
+            let count = 3 * self.phi_spans.max(2 * PHI_SPANS_MIN);
+            let turn = TAU / count as f64;
+            return (0..count).map(|k| (turn * (k as f64 + 0.5), turn)).collect();
+        };
+        let rule = gauss_legendre(DEGREE);
+        let breaks = round.breaks();
+        let spans =
+            breaks.windows(2).map(|span| (f64::midpoint(span[0], span[1]), span[1] - span[0]));
+        let nodes = spans.flat_map(|(middle, width)| {
+            rule.iter()
+                .map(move |(node, weight)| (middle + 0.5 * width * node, 0.5 * width * weight))
+        });
+        nodes.collect()
     }
 
     /// Where a function is centred.
@@ -274,11 +383,11 @@ impl PolarSplines {
         let placed = &self.bands[at];
         let theta_deg = greville(at, &self.breaks).to_degrees();
         match placed.band {
-            Band::Local { count } => {
+            Band::Local(round) => {
                 // A cubic spline is centred two spans after its support begins; the first one's
                 // begins three spans before φ = 0.
-                let turns = ((k - placed.at) as f64 - 1.0) / count as f64;
-                let phi_deg = 360.0 * (turns - libm::floor(turns));
+                let (breaks, len) = (round.breaks(), round.len());
+                let phi_deg = breaks[(k - placed.at + len - 1) % len].to_degrees();
                 format!("B({theta_deg:.1}°,{phi_deg:.1}°)")
             }
             Band::Orders { first, .. } => {
@@ -303,11 +412,6 @@ fn wave(m: usize, phi_rad: f64, order: usize) -> [f64; 2] {
         1 => [-m * sin, m * cos],
         _ => [-m * m * cos, -m * m * sin],
     }
-}
-
-fn round(count: usize) -> Result<BSpline, DomainError> {
-    let breaks: Vec<f64> = (0..=count).map(|k| TAU * k as f64 / count as f64).collect();
-    BSpline::periodic(DEGREE, &breaks)
 }
 
 /// Cubic: the field and its first two derivatives are continuous.

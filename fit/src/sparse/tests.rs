@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 const REGION: Region = Region::surface((-0.01, 0.01), (-0.01, 0.01), FRAC_PI_2);
 
 fn basis(position: Position) -> BasisSpec {
-    let fine = Fine { from: 0, to: 2, halvings: 1 };
+    let fine = Fine { from: 0, to: 2, halvings: 1, ..Fine::NONE };
     BasisSpec { angular: Angular::Splines { theta_spans: 6, phi_spans: 9, fine }, position }
 }
 
@@ -88,7 +88,9 @@ fn a_plain_fit_equals_the_dense_one_to_rounding() {
         agree(&dense, &sparse);
         assert!((dense.determined() - sparse.determined()).abs() < 1e-9);
         let (a, b) = (dense.covariance(), sparse.covariance());
-        assert!((a[3][7] / b[3][7] - 1.0).abs() < 1e-6);
+        // Products of rows square the condition, 3e5 of the second.
+        let rounding = (1e-15 * dense.condition().powi(2)).max(1e-9);
+        assert!((a[3][7] / b[3][7] - 1.0).abs() < rounding);
     }
 }
 

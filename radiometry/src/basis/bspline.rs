@@ -21,7 +21,7 @@ use crate::quadrature::gauss_legendre;
 /// Of degree p there are p + 1 non-zero ones at any place. At a knot that stands r times the
 /// p - r first derivatives are continuous; at one that stands p + 1 times there is a jump, and the
 /// value is that from the right (at the domain's end: from the left).
-/// Who needs it: fits of fields too sharp for polynomials (no caller in `fit` yet).
+/// Who needs it: fits of fields too sharp for polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BSpline {
     degree: usize,

@@ -21,7 +21,7 @@ pub(crate) struct FitArgs {
     pub(crate) partial: bool,
     /// Merge partial fits: the fit of all their samples.
     #[arg(long, conflicts_with_all = ["basis", "angular_degree", "cosine_columns", "theta_spans",
-        "phi_spans", "fine_spans", "position_degree", "position_spans", "penalty_power",
+        "phi_spans", "fine_spans", "fine_phi_spans", "position_degree", "position_spans", "penalty_power",
         "penalty_strength", "rig"])]
     pub(crate) merge: bool,
     #[command(flatten)]
@@ -53,6 +53,15 @@ pub(crate) struct FitArgs {
         value_delimiter = ','
     )]
     pub(crate) fine_spans: Option<Vec<f64>>,
+    /// Where within these spans of φ are halved too, counted on beyond a full turn: the first, the one
+    /// after the last, halvings.
+    #[arg(
+        long,
+        value_name = "FIRST,AFTER_LAST,HALVINGS",
+        requires = "fine_spans",
+        value_delimiter = ','
+    )]
+    pub(crate) fine_phi_spans: Option<Vec<f64>>,
     /// Power of the degree that is held against rough fields, 0 to 18 (of splines 1 or 2); 0 for
     /// plain least squares.
     #[arg(long, value_name = "POWER", allow_negative_numbers = true)]
