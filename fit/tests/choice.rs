@@ -234,6 +234,36 @@ fn all_that_was_tried_can_be_pinned() {
     }
 }
 
+/// A ridge 6° wide in θ and 25° long in φ, beside the horizon: finer spans of θ all round, as many as
+/// are affordable, do not follow its ends.
+#[test]
+fn what_is_narrow_both_ways_is_followed_in_a_patch() {
+    let field: Field =
+        |ray| 0.2 + (0..5).map(|k| lobe(ray, 500.0, 70.0, 5.0 * f64::from(k) - 12.0)).sum::<f64>();
+    let samples = noisy(&raster_rays(&CONE, 41, 90, 1), field, 0.002, &mut Die::new(5));
+    let (fit, choice) = fitted(&samples, &CONE);
+    let Angular::Splines { theta_spans, phi_spans, fine } =
+        choice.candidates[0].model.basis.angular
+    else {
+        panic!("{:?}", choice.candidates[0])
+    };
+    assert!(!fine.around.is_none() && fine.around.halvings > 1, "{fine:?}");
+    // The patch lies about the ridge, which goes through φ = 0.
+    let deg = |span: usize, spans: usize, whole: f64| whole * span as f64 / spans as f64;
+    let (from, to) = (deg(fine.from, theta_spans, 90.0), deg(fine.to, theta_spans, 90.0));
+    assert!(from < 66.0 && to > 74.0, "{from} {to}");
+    let around = fine.around;
+    let (from, to) = (deg(around.from, phi_spans, 360.0), deg(around.to, phi_spans, 360.0));
+    assert!(from - 360.0 < -12.0 && to - 360.0 > 8.0 && to - from < 181.0, "{from} {to}");
+    let (rms, ratio, covered, _) = errors(&fit, field, &CONE);
+    assert!(rms < 0.006 && ratio < 2.0 && covered > 0.93, "{rms} {ratio} {covered}");
+    let without = |c: &&fit::Candidate| matches!(c.model.basis.angular, Angular::Splines { fine, .. } if fine.around.is_none());
+    let without = choice.candidates.iter().find(without).unwrap().model;
+    let coarse = fit::fit(&samples, &CONE, without, &[]).unwrap();
+    let (coarse, ..) = errors(&coarse, field, &CONE);
+    assert!(coarse > 3.0 * rms, "{coarse} {rms}");
+}
+
 /// Too few readings to leave any out. Were the penalty dropped, nothing would hold the splines.
 #[test]
 fn what_is_pinned_holds_where_nothing_can_be_chosen() {

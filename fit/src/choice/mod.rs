@@ -9,6 +9,7 @@
 mod evidence;
 mod family;
 mod gleaning;
+mod refining;
 mod search;
 mod sweeps;
 mod tally;
@@ -95,8 +96,9 @@ pub fn choose(
     strength_can_be_chosen(wish)?;
     check(samples, region, smallest(region, 0, 0).into(), &[])?;
     one_pose(samples, region)?;
-    let sweeps = Sweeps::of(samples, region).thinned(search::readings_max(optics));
-    let chosen: Vec<Sample> = sweeps.members.iter().flatten().map(|i| samples[*i]).collect();
+    let whole = Sweeps::of(samples, region);
+    let mut sweeps = whole.clone().thinned(search::readings_max(optics));
+    let mut chosen = sweeps.samples_of(samples);
     let found = |one_by_one: bool| -> Result<Vec<(BasisSpec, Trial)>, FitError> {
         let mut search = Search::new(&chosen, region, wish, optics, &sweeps, one_by_one);
         search.run()?;
@@ -109,7 +111,15 @@ pub fn choose(
         n_lines = None;
         tried = found(true)?;
     }
-    tried.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
+    sort(&mut tried);
+    if refining::calls_for_a_patch(&tried, wish) {
+        // What is narrow both ways shows where sweeps are close together.
+        sweeps = whole.thinned(refining::READINGS_MAX);
+        chosen = sweeps.samples_of(samples);
+        let mut search = Search::new(&chosen, region, wish, optics, &sweeps, n_lines.is_none());
+        search.patch_beside(&mut tried)?;
+        sort(&mut tried);
+    }
     prefer_finer(&mut tried);
     let Some(&(_, best)) = tried.first() else {
         // Nothing can be left out: the mean is all there is, or what was pinned.
@@ -136,6 +146,11 @@ pub fn choose(
     };
     let model = Penalised { truncation, ..choice.candidates[0].model };
     Ok((model, Some(choice)))
+}
+
+/// The best first.
+fn sort(tried: &mut [(BasisSpec, Trial)]) {
+    tried.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
 }
 
 /// Splines that are pinned, and too many for a choice to go through strengths of their penalty.

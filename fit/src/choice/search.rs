@@ -7,7 +7,6 @@ use crate::beam::Optics;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
 use crate::{Angular, BasisSpec, Chart, Fine, FitError, Position, Region, Sample};
-use std::f64::consts::FRAC_PI_2;
 
 /// Readings that a choice is made from at most.
 pub(super) fn readings_max(optics: Option<&Optics>) -> usize {
@@ -16,13 +15,13 @@ pub(super) fn readings_max(optics: Option<&Optics>) -> usize {
 
 /// The candidates tried so far.
 pub(super) struct Search<'s> {
-    samples: &'s [Sample],
+    pub(super) samples: &'s [Sample],
     region: &'s Region,
     wish: &'s Wish,
     optics: Option<&'s Optics>,
     u: Vec<f64>,
-    strengths: Strengths,
-    folds: Vec<Vec<usize>>,
+    pub(super) strengths: Strengths,
+    pub(super) folds: Vec<Vec<usize>>,
     /// Highest degree in position that places tell apart.
     position_most: usize,
     coefficients_max: usize,
@@ -188,84 +187,6 @@ impl<'s> Search<'s> {
         Ok(())
     }
 
-    /// Halves the spans of θ in which the best splines leave residuals, again and again, while that
-    /// does better. Where splines are not among the best, nothing is narrow. Where it helps,
-    /// coarse splines are refined too: they follow a narrow lobe without being free elsewhere.
-    fn refine(&mut self, position: Position) -> Result<(), FitError> {
-        let is_splines = |spec: &BasisSpec| matches!(spec.angular, Angular::Splines { .. });
-        let (Some((spec, trial)), Some((_, all))) = (self.best(is_splines), self.best(|_| true))
-        else {
-            return Ok(());
-        };
-        if trial.score < all.score - NEAR || spec.position != position {
-            return Ok(());
-        }
-        self.halve(spec)?;
-        if self.best(is_splines).is_none_or(|(best, _)| best == spec) {
-            return Ok(());
-        }
-        for (theta_spans, phi_spans) in COARSE {
-            let angular = Angular::Splines { theta_spans, phi_spans, fine: Fine::NONE };
-            let coarse = BasisSpec { angular, position };
-            if coarse != spec && self.is_affordable(coarse) {
-                self.halve(coarse)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Halves spans of splines as long as that does better.
-    fn halve(&mut self, start: BasisSpec) -> Result<(), FitError> {
-        let first = self.family(start)?.trial(start, self.strengths, &self.folds)?;
-        let Some((Trial { score, .. }, mut residuals)) = first else { return Ok(()) };
-        let (mut spec, mut best, mut worse) = (start, score, 0);
-        while let Some(angular) = self.finer(spec.angular, &residuals) {
-            let finer = BasisSpec { angular, ..spec };
-            if !self.is_affordable(finer) || self.has(finer) {
-                break;
-            }
-            let found = self.family(finer)?.trial(finer, self.strengths, &self.folds)?;
-            let Some((next, left)) = found else { break };
-            self.tried.push((finer, next));
-            worse = if next.score > best { 0 } else { worse + 1 };
-            best = best.max(next.score);
-            if worse == HALVINGS_IN_VAIN {
-                break;
-            }
-            (spec, residuals) = (finer, left);
-        }
-        Ok(())
-    }
-
-    /// The same splines with the spans halved in which residuals exceed what they are elsewhere.
-    fn finer(&self, angular: Angular, residuals: &[f64]) -> Option<Angular> {
-        let Angular::Splines { theta_spans, phi_spans, fine } = angular else { return None };
-        let mut sums = vec![(0.0, 0.0); theta_spans];
-        for (sample, residual) in self.samples.iter().zip(residuals) {
-            let at = sample.ray.theta_rad / FRAC_PI_2 * theta_spans as f64;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a place in a list
-            let (sum, count) = &mut sums[(at.max(0.0) as usize).min(theta_spans - 1)];
-            *sum += residual * residual;
-            *count += 1.0;
-        }
-        let means: Vec<f64> =
-            sums.iter().map(|(sum, count)| if *count > 0.0 { sum / count } else { 0.0 }).collect();
-        let mut sorted: Vec<f64> = means.iter().copied().filter(|mean| *mean > 0.0).collect();
-        sorted.sort_by(f64::total_cmp);
-        let least = RESIDUES * sorted.get(sorted.len() / 2)?;
-        let is_off = |mean: &f64| *mean > least;
-        let (from, to) = (means.iter().position(is_off)?, means.iter().rposition(is_off)? + 1);
-        // Anew each time: what is followed by now needs no finer spans.
-        let fine = if fine.is_none() {
-            Fine { from: from.saturating_sub(1), to: (to + 1).min(theta_spans), halvings: 1 }
-        } else {
-            let (from, to) = (from.max(fine.from), to.min(fine.to));
-            let (from, to) = if from < to { (from, to) } else { (fine.from, fine.to) };
-            Fine { from, to, halvings: fine.halvings + 1 }
-        };
-        Some(Angular::Splines { theta_spans, phi_spans, fine })
-    }
-
     /// Tries other functions of the position with a basis of the direction.
     fn places(&mut self, angular: Angular, degree: usize) -> Result<(), FitError> {
         let at = POSITION.iter().position(|d| *d == degree).unwrap_or(0);
@@ -286,20 +207,28 @@ impl<'s> Search<'s> {
         Ok(())
     }
 
-    fn family(&self, spec: BasisSpec) -> Result<Family, FitError> {
+    pub(super) fn family(&self, spec: BasisSpec) -> Result<Family, FitError> {
         Family::new(spec, self.region, self.samples, &self.u, self.optics)
     }
 
-    fn best(&self, of: impl Fn(&BasisSpec) -> bool) -> Option<(BasisSpec, Trial)> {
+    pub(super) fn best(&self, of: impl Fn(&BasisSpec) -> bool) -> Option<(BasisSpec, Trial)> {
         let among = self.tried.iter().filter(|(spec, _)| of(spec));
         among.max_by(|a, b| a.1.score.total_cmp(&b.1.score)).copied()
     }
 
-    fn has(&self, spec: BasisSpec) -> bool {
+    pub(super) fn has(&self, spec: BasisSpec) -> bool {
         self.tried.iter().any(|(tried, _)| *tried == spec)
     }
 
-    fn is_affordable(&self, spec: BasisSpec) -> bool {
+    pub(super) fn is_degree_open(&self) -> bool {
+        self.wish.position_degree.is_none()
+    }
+
+    pub(super) fn theta_max_rad(&self) -> f64 {
+        self.region.theta_max_rad
+    }
+
+    pub(super) fn is_affordable(&self, spec: BasisSpec) -> bool {
         spec.len() <= self.coefficients_max
     }
 }
@@ -324,14 +253,6 @@ const MIDDLING: [usize; 2] = [6, 2];
 const COSINE_COLUMNS: usize = 2;
 /// A basis has to fail this often before finer ones are given up.
 const WORSE_MAX: usize = 3;
-/// Splines that score less than the best by more than this are not refined.
-const NEAR: f64 = 0.3;
-/// Squared residuals over their median over θ that call for finer spans.
-const RESIDUES: f64 = 1.5;
-/// Halving may do no better this often before it is given up.
-const HALVINGS_IN_VAIN: usize = 2;
-/// Splines that a narrow lobe is followed with where the rest is smooth.
-const COARSE: [(usize, usize); 2] = [(4, 8), (7, 12)];
 /// Bases that share rows.
 const SHARING: usize = 5;
 const ZERNIKE: [usize; 10] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 24];

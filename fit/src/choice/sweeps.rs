@@ -98,6 +98,11 @@ impl Sweeps {
         self
     }
 
+    /// The samples of all sweeps, in their order.
+    pub(crate) fn samples_of(&self, samples: &[Sample]) -> Vec<Sample> {
+        self.members.iter().flatten().map(|i| samples[*i]).collect()
+    }
+
     /// The sweeps dealt into `count` folds, neighbouring ones into different folds; where lines are
     /// shared, and unless sweeps are to be left out one by one, all of a line into one. Indices
     /// count the readings in the order of `members`.
