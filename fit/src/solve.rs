@@ -371,6 +371,13 @@ pub(crate) fn sensitivities(
     let samples = design.samples();
     let Settled { coefficients, levels, .. } = settled;
     let mut room = design.room();
+    // Along the samples' own rays, once for all components that see others.
+    let is_seen = |common: &&Common| matches!(common.shift, Shift::Ray(_) | Shift::Jitter(_));
+    let mut own = Vec::new();
+    if common.iter().any(is_seen) {
+        let along = |(i, s): (usize, &Sample)| design.along(i, &s.ray, coefficients, &mut room);
+        own.extend(samples.iter().enumerate().map(along));
+    }
     let mut change = |common: &Common, through: Option<&mut Through>, i: usize| match &common.shift
     {
         Shift::Scale => common.u * levels[i],
@@ -382,8 +389,9 @@ pub(crate) fn sensitivities(
         Shift::Offset => common.u,
         Shift::Value(excess) => excess(i, levels[i]),
         Shift::Ray(seen) | Shift::Jitter(seen) => {
-            let seen = seen(i, &samples[i].ray);
-            design.change(i, &seen, coefficients, &mut room)
+            let (ray, seen) = (&samples[i].ray, seen(i, &samples[i].ray));
+            let is_same = seen == *ray;
+            if is_same { 0.0 } else { design.along(i, &seen, coefficients, &mut room) - own[i] }
         }
     };
     let mut sides = Vec::with_capacity(common.len());

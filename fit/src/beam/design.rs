@@ -214,8 +214,18 @@ impl<'s> Design<'s> {
         level
     }
 
-    /// By how much a sample's reading changes when another ray is seen. Over a beam that nothing
-    /// cuts the axis tells.
+    /// What a sample would read along a ray, for changes alone: over a beam that nothing cuts the axis
+    /// tells, over others the coarsest rule, whose error cancels.
+    pub(crate) fn along(&self, i: usize, ray: &Ray, coefficients: &[f64], room: &mut Room) -> f64 {
+        let is_cut = |beam: &&Averaged| matches!(beam.kinds[i], Kind::Across(_) | Kind::Off);
+        let Some(Averaged { averager, .. }) = self.beam.as_ref().filter(is_cut) else {
+            return self.basis.value(coefficients, ray, &mut room.scratch);
+        };
+        averager.row(Kind::Across(0), ray, self.basis, &mut room.means, &mut room.row);
+        dot(&room.row, coefficients)
+    }
+
+    /// By how much a sample's reading changes when another ray is seen.
     pub(crate) fn change(
         &self,
         i: usize,
@@ -227,18 +237,7 @@ impl<'s> Design<'s> {
         if seen == ray {
             return 0.0;
         }
-        let Some(Averaged { averager, .. }) =
-            self.beam.as_ref().filter(|beam| matches!(beam.kinds[i], Kind::Across(_) | Kind::Off))
-        else {
-            return self.basis.value(coefficients, seen, &mut room.scratch)
-                - self.basis.value(coefficients, ray, &mut room.scratch);
-        };
-        // The same rule for both, so that its error cancels: the coarsest is enough for a change.
-        let mut level = |ray: &Ray| {
-            averager.row(Kind::Across(0), ray, self.basis, &mut room.means, &mut room.row);
-            dot(&room.row, coefficients)
-        };
-        level(seen) - level(ray)
+        self.along(i, seen, coefficients, room) - self.along(i, ray, coefficients, room)
     }
 
     /// Another beam for the same readings, cut by the same outline; `None` where there is no beam.
@@ -260,7 +259,7 @@ impl<'s> Design<'s> {
         coefficients: &[f64],
         room: &mut Room,
     ) -> f64 {
-        let Some(Averaged { averager, kinds, .. }) = &self.beam else { return 0.0 };
+        let Some(beam @ Averaged { averager, kinds, .. }) = &self.beam else { return 0.0 };
         // The same rule for both, so that its error cancels.
         let kind = match kinds[i] {
             Kind::Point | Kind::Off => return 0.0,
@@ -272,7 +271,9 @@ impl<'s> Design<'s> {
             averager.row(kind, ray, self.basis, means, &mut room.row);
             dot(&room.row, coefficients)
         };
-        level(&through.averager, &mut through.means) - level(averager, &mut room.means)
+        let other = level(&through.averager, &mut through.means);
+        let kept = beam.row(i, self.basis.len()).filter(|_| kind == kinds[i]);
+        other - kept.map_or_else(|| level(averager, &mut room.means), |row| dot(row, coefficients))
     }
 
     /// The field that an offset of all readings looks like, if it does like any.

@@ -267,6 +267,8 @@ pub(crate) struct Means {
     place: Scratch,
     position: Vec<f64>,
     direction: Vec<f64>,
+    /// Of local functions those that may not be zero, instead of all.
+    near: Option<Vec<(usize, f64)>>,
     /// Of functions that are no product: the row's mean over the places of one direction, and room.
     joint: Option<(Vec<f64>, Vec<f64>)>,
     towards: DVec3,
@@ -279,6 +281,7 @@ impl Means {
             place: basis.scratch(),
             position: vec![0.0; basis.position_len()],
             direction: vec![0.0; basis.angular_len()],
+            near: basis.directions().local().map(|_| Vec::new()),
             joint: basis.is_joint().then(|| (vec![0.0; basis.len()], vec![0.0; basis.len()])),
             towards: DVec3::Z,
             moments: Moments::default(),
@@ -295,7 +298,13 @@ impl Means {
         if self.joint.is_some() {
             return;
         }
-        basis.direction_along(direction, &mut self.place, &mut self.direction);
+        match (&mut self.near, basis.directions().local()) {
+            (Some(near), Some(splines)) => {
+                near.clear();
+                splines.each_along(direction, |j, value| near.push((j, value)));
+            }
+            _ => basis.direction_along(direction, &mut self.place, &mut self.direction),
+        }
     }
 
     fn clear(&mut self) {
@@ -324,6 +333,10 @@ impl Means {
         }
         for (mean, block) in self.position.iter().zip(out.chunks_exact_mut(self.direction.len())) {
             let factor = weight * mean;
+            if let Some(near) = &self.near {
+                near.iter().for_each(|(j, z)| block[*j] += factor * z);
+                continue;
+            }
             block.iter_mut().zip(&self.direction).for_each(|(out, z)| *out += factor * z);
         }
     }
