@@ -272,7 +272,8 @@ const IN_FLIGHT: [(u32, f64, u32); 14] = [
 const IN_FLIGHT_DIM: [(u32, f64, u32); 5] =
     [(1, 0.0, 4), (1, 0.0, 12), (2, 0.0, 4), (2, 0.0, 12), (3, 0.0, 24)];
 /// Places a side, meridians: each flown at one place alone.
-const INTERLEAVED: [(u32, u32); 7] = [(2, 8), (2, 12), (2, 16), (2, 24), (2, 36), (2, 60), (3, 72)];
+const INTERLEAVED: [(u32, u32); 9] =
+    [(2, 8), (2, 12), (2, 16), (2, 24), (2, 36), (2, 60), (3, 72), (2, 90), (2, 120)];
 
 #[cfg(test)]
 mod tests {
