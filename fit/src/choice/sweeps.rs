@@ -164,7 +164,12 @@ fn by_key(rays: &[Ray], key: Keys) -> (Vec<Vec<usize>>, Vec<i64>) {
     for (i, ray) in rays.iter().enumerate() {
         members.entry(key(ray)).or_default().push(i);
     }
-    let along = |ray: &Ray| [self::key(ray.theta_rad), self::key(ray.phi_rad)];
+    // From one horizon through the normal to the other, so that every second one is of both halves.
+    let along = |ray: &Ray| {
+        let theta = self::key(ray.theta_rad);
+        let is_far = ray.phi_rad.rem_euclid(core::f64::consts::TAU) >= core::f64::consts::PI;
+        [if is_far { -theta } else { theta }, self::key(ray.phi_rad)]
+    };
     let lines = members.keys().map(|key| key[0]).collect();
     let mut members: Vec<Vec<usize>> = members.into_values().collect();
     for sweep in &mut members {
@@ -293,6 +298,22 @@ mod tests {
                     .len()
             };
             assert_eq!((distinct(&|ray| ray.phi_rad), distinct(&|ray| 1e2 * ray.x_m)), (12, 4));
+        }
+    }
+
+    #[test]
+    fn a_thinned_sweep_has_readings_on_both_sides_of_the_normal() {
+        let line = |phi: f64| {
+            let of =
+                move |side: f64| (1..66).map(move |i| sample(0.0, f64::from(i) * 1.2, phi + side));
+            of(0.0).chain(of(180.0))
+        };
+        let samples: Vec<Sample> = (0..30).flat_map(|k| line(6.0 * f64::from(k))).collect();
+        let few = Sweeps::of(&samples, &REGION).thinned(samples.len() / 8);
+        for sweep in &few.members {
+            let near = sweep.iter().filter(|i| samples[**i].ray.phi_rad < 3.1).count();
+            assert!((near as f64 / sweep.len() as f64 - 0.5).abs() < 0.1, "{near}");
+            assert!(sweep.len() < 130);
         }
     }
 
