@@ -229,8 +229,10 @@ fn basis_in_words(basis: BasisSpec) -> String {
             } else if around.is_none() {
                 along
             } else {
+                // Through φ = 0 it goes on from there.
                 let at = |span| deg(span, phi_spans, 360.0);
-                let (finer, from, to) = (times(around.halvings), at(around.from), at(around.to));
+                let end = if around.to > phi_spans { around.to - phi_spans } else { around.to };
+                let (finer, from, to) = (times(around.halvings), at(around.from), at(end));
                 format!("{along}, there in φ {finer} times from {from:.0}° to {to:.0}°")
             }
         }

@@ -1,6 +1,6 @@
 //! Which basis: how fine in direction and in position. Names a basis; evaluates nothing.
 
-use super::splines::{PHI_SPANS_MIN, bands};
+use super::splines::{Band, PHI_SPANS_MIN, bands};
 use crate::{Chart, FitError};
 
 /// Which functions a field is a sum of: every function of direction times every one of position.
@@ -232,7 +232,7 @@ impl Angular {
                 usize::MAX
             }
             Self::Splines { theta_spans, phi_spans, fine } => {
-                bands(theta_spans, phi_spans, fine).map(|band| band.len()).sum()
+                bands(theta_spans, phi_spans, fine).map(Band::len).sum()
             }
         }
     }

@@ -334,7 +334,9 @@ impl Means {
         for (mean, block) in self.position.iter().zip(out.chunks_exact_mut(self.direction.len())) {
             let factor = weight * mean;
             if let Some(near) = &self.near {
-                near.iter().for_each(|(j, z)| block[*j] += factor * z);
+                for (j, z) in near {
+                    block[*j] += factor * z;
+                }
                 continue;
             }
             block.iter_mut().zip(&self.direction).for_each(|(out, z)| *out += factor * z);
