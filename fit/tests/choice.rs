@@ -264,6 +264,20 @@ fn what_is_narrow_both_ways_is_followed_in_a_patch() {
     assert!(coarse > 3.0 * rms, "{coarse} {rms}");
 }
 
+/// Many functions of the position leave no room for splines in direction: no patch, and no refusal.
+#[test]
+fn a_patch_that_is_not_affordable_is_not_tried() {
+    let field: Field = |ray| 0.2 + lobe(ray, 400.0, 45.0, 45.0);
+    let samples = noisy(&raster_rays(&CONE, 9, 8, 6), field, 0.002, &mut Die::new(3));
+    let wish = Wish { position_degree: Some(8), ..Wish::default() };
+    let (_, choice) = fit::choose(&samples, &CONE, &wish, None).unwrap();
+    let candidates = choice.unwrap().candidates;
+    // What is tried misses enough to ask for one.
+    assert!(candidates[0].left_out_rms > 3.0, "{}", candidates[0].left_out_rms);
+    let is_patch = |c: &fit::Candidate| matches!(c.model.basis.angular, Angular::Splines { fine, .. } if !fine.around.is_none());
+    assert!(!candidates.iter().any(is_patch));
+}
+
 /// Too few readings to leave any out. Were the penalty dropped, nothing would hold the splines.
 #[test]
 fn what_is_pinned_holds_where_nothing_can_be_chosen() {

@@ -119,6 +119,9 @@ impl Search<'_> {
         for (theta_spans, phi_spans) in PATCHED {
             let angular = Angular::Splines { theta_spans, phi_spans, fine: Fine::NONE };
             let coarse = BasisSpec { angular, position };
+            if coarse.len() > self.patched_max() {
+                continue;
+            }
             let found = self.family(coarse)?.trial(coarse, self.strengths, &self.folds)?;
             let Some((_, residuals)) = found else { continue };
             if let Some(fine) = self.patch_in((theta_spans, phi_spans), &residuals) {
@@ -154,11 +157,15 @@ impl Search<'_> {
         Ok(())
     }
 
+    fn patched_max(&self) -> usize {
+        PATCHED_COEFFICIENTS_MAX.min(self.samples.len())
+    }
+
     /// Whether a patch's readings lie no further apart than two of its spans over half of it at least,
     /// along θ and round φ: between lines that are further apart a narrow function would be anything.
     fn is_followable(&self, spec: BasisSpec) -> bool {
         let Angular::Splines { theta_spans, phi_spans, fine } = spec.angular else { return false };
-        if spec.len() > PATCHED_COEFFICIENTS_MAX.min(self.samples.len()) {
+        if spec.len() > self.patched_max() {
             return false;
         }
         let parts = |halvings: usize| f64::from(1_u32 << halvings.min(31));
