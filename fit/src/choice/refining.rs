@@ -60,19 +60,9 @@ impl Search<'_> {
     /// The same splines with the spans halved in which residuals exceed what they are elsewhere.
     fn finer(&self, angular: Angular, residuals: &[f64]) -> Option<Angular> {
         let Angular::Splines { theta_spans, phi_spans, fine } = angular else { return None };
-        let mut sums = vec![(0.0, 0.0); theta_spans];
-        for (sample, residual) in self.samples.iter().zip(residuals) {
-            let at = sample.ray.theta_rad / FRAC_PI_2 * theta_spans as f64;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a place in a list
-            let (sum, count) = &mut sums[(at.max(0.0) as usize).min(theta_spans - 1)];
-            *sum += residual * residual;
-            *count += 1.0;
-        }
-        let means: Vec<f64> =
-            sums.iter().map(|(sum, count)| if *count > 0.0 { sum / count } else { 0.0 }).collect();
-        let mut sorted: Vec<f64> = means.iter().copied().filter(|mean| *mean > 0.0).collect();
-        sorted.sort_by(f64::total_cmp);
-        let least = RESIDUES * sorted.get(sorted.len() / 2)?;
+        let theta = |sample: &Sample| Some(place(sample.ray.theta_rad, FRAC_PI_2, theta_spans));
+        let (means, usual) = self.mean_squares(theta_spans, residuals, theta);
+        let least = RESIDUES * usual?;
         let is_off = |mean: &f64| *mean > least;
         let (from, to) = (means.iter().position(is_off)?, means.iter().rposition(is_off)? + 1);
         // Anew each time: what is followed by now needs no finer spans.
@@ -213,6 +203,17 @@ impl Search<'_> {
         residuals: &[f64],
         bin: impl Fn(&Sample) -> Option<usize>,
     ) -> Vec<f64> {
+        let (means, usual) = self.mean_squares(bins, residuals, bin);
+        means.iter().map(|mean| (mean - usual.unwrap_or(0.0)).max(0.0)).collect()
+    }
+
+    /// Mean squares of residuals by bin, 0 where there are none, and the median of the others.
+    fn mean_squares(
+        &self,
+        bins: usize,
+        residuals: &[f64],
+        bin: impl Fn(&Sample) -> Option<usize>,
+    ) -> (Vec<f64>, Option<f64>) {
         let mut sums = vec![(0.0, 0.0); bins];
         for (sample, residual) in self.samples.iter().zip(residuals) {
             if let Some(bin) = bin(sample) {
@@ -220,12 +221,12 @@ impl Search<'_> {
                 sums[bin].1 += 1.0;
             }
         }
-        let means = sums.iter().map(|(sum, count)| if *count > 0.0 { sum / count } else { 0.0 });
-        let means: Vec<f64> = means.collect();
+        let mean = |(sum, count): &(f64, f64)| if *count > 0.0 { sum / count } else { 0.0 };
+        let means: Vec<f64> = sums.iter().map(mean).collect();
         let mut sorted: Vec<f64> = means.iter().copied().filter(|mean| *mean > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
-        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-        means.iter().map(|mean| (mean - usual).max(0.0)).collect()
+        let usual = sorted.get(sorted.len() / 2).copied();
+        (means, usual)
     }
 }
 
@@ -264,10 +265,11 @@ fn is_dense(mut places: Vec<f64>, length: f64, step: f64) -> bool {
 /// The shortest stretch of bins that holds nearly all of the sum; round a circle it may go through its
 /// end. The first, and the one after the last.
 fn stretch(excess: &[f64], is_round: bool) -> Option<(usize, usize)> {
-    let all: f64 = excess.iter().sum();
-    let bins = excess.len();
-    let first = (all > 0.0).then_some(1)?;
-    for length in first..=bins {
+    let (all, bins) = (excess.iter().sum::<f64>(), excess.len());
+    if all <= 0.0 {
+        return None;
+    }
+    for length in 1..=bins {
         let starts = if is_round { bins } else { bins + 1 - length };
         let held = |from: usize| -> f64 { (from..from + length).map(|k| excess[k % bins]).sum() };
         let best = (0..starts).max_by(|a, b| held(*a).total_cmp(&held(*b)))?;
