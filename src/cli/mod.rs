@@ -86,5 +86,6 @@ pub fn main() -> ExitCode {
         Command::Continue(args) => remote::ask(&args, "continue"),
         Command::Abort(args) => remote::ask(&args, "abort"),
     };
+    halt::take_last_word();
     outcome.unwrap_or_else(|failure| failure.report())
 }
