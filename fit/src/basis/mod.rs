@@ -193,11 +193,16 @@ impl Basis {
         if let Some(splines) = self.directions.local() {
             self.position(ray, scratch);
             let (width, mut sum) = (self.angular_len(), 0.0);
-            splines.each_along(direction::unit(ray.theta_rad, ray.phi_rad), |j, z| {
+            let hand = |j: usize, z: f64| {
                 let places = scratch.position.iter().enumerate();
                 let at: f64 = places.map(|(q, p)| p * coefficients[q * width + j]).sum();
                 sum += at * z;
-            });
+            };
+            if (0.0..=FRAC_PI_2).contains(&ray.theta_rad) {
+                splines.each_towards(ray.theta_rad, ray.phi_rad, hand);
+            } else {
+                splines.each_along(direction::unit(ray.theta_rad, ray.phi_rad), hand);
+            }
             return sum;
         }
         self.evaluate(ray, scratch);

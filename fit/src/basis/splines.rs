@@ -14,7 +14,7 @@
 use super::spec::{Around, Fine};
 use glam::DVec3;
 use radiometry::DomainError;
-use radiometry::basis::BSpline;
+use radiometry::basis::{Active, BSpline};
 use radiometry::quadrature::gauss_legendre;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -243,11 +243,15 @@ impl PolarSplines {
     /// Hands on every function that may not be zero in a direction, some in two parts; below the
     /// horizon those at it.
     pub(crate) fn each_along(&self, d: DVec3, hand: impl FnMut(usize, f64)) {
-        let theta = libm::atan2(libm::hypot(d.x, d.y), d.z);
-        let phi = libm::atan2(d.y, d.x);
+        let theta_rad = libm::atan2(libm::hypot(d.x, d.y), d.z);
+        self.each_towards(theta_rad, libm::atan2(d.y, d.x), hand);
+    }
+
+    /// The same in a direction given by its angles.
+    pub(crate) fn each_towards(&self, theta_rad: f64, phi_rad: f64, hand: impl FnMut(usize, f64)) {
         let value = Derivative { theta: 0, phi: 0 };
         // Within the domain by the clamp.
-        let done = self.each(theta, phi, value, hand);
+        let done = self.each(theta_rad, phi_rad, value, hand);
         debug_assert!(done.is_ok(), "a direction has a θ and a φ");
     }
 
@@ -261,6 +265,8 @@ impl PolarSplines {
     ) -> Result<(), DomainError> {
         let theta_rad = theta_rad.clamp(0.0, FRAC_PI_2);
         let across = self.theta.nonzero_derivatives(theta_rad, order.theta)?;
+        // Towards the horizon neighbouring bands often have the same functions round φ.
+        let mut last: Option<(Band, Active)> = None;
         for (i, along) in across.iter() {
             // The first band's function of θ is the first spline and the second.
             if i == 1 && order.phi == 0 {
@@ -268,8 +274,11 @@ impl PolarSplines {
             }
             let placed = &self.bands[i];
             match (&placed.round, placed.band) {
-                (Some(round), _) => {
-                    let around = round.nonzero_derivatives(phi_rad, order.phi)?;
+                (Some(round), band) => {
+                    if last.as_ref().is_none_or(|(before, _)| *before != band) {
+                        last = Some((band, round.nonzero_derivatives(phi_rad, order.phi)?));
+                    }
+                    let Some((_, around)) = &last else { continue };
                     around.iter().for_each(|(j, value)| hand(placed.at + j, along * value));
                 }
                 (None, Band::Orders { first, last }) => {

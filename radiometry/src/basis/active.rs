@@ -41,38 +41,49 @@ impl Active {
 
     /// Values by the recurrence up to a degree, derivatives from there to the full degree.
     /// `knots`: from the start of the first function's support on.
+    #[inline]
     pub(super) fn raise(&mut self, knots: &[f64], x: f64, to: usize) -> Result<(), DomainError> {
-        let degree = self.count - 1;
-        self.values[0] = 1.0;
-        // x lies between the knots at places `degree` and `degree + 1`.
-        for reached in 0..to {
-            let mut from_left = 0.0;
-            for i in 0..=reached {
-                let right = knots[degree + 1 + i] - x;
-                let left = x - knots[degree + i - reached];
-                let share = self.values[i] / (right + left);
-                self.values[i] = right.mul_add(share, from_left);
-                from_left = left * share;
-            }
-            self.values[reached + 1] = from_left;
-        }
-        // A value that is all of 1 may be an ulp above it.
-        self.values[..=to].iter_mut().for_each(|value| *value = value.min(1.0));
-        // B'ᵢ of degree q + 1 is (q + 1)(Bᵢ/(tᵢ₊q₊₁ - tᵢ) - Bᵢ₊₁/(tᵢ₊q₊₂ - tᵢ₊₁)) of degree q.
-        for reached in to..degree {
-            let mut from_left = 0.0;
-            for i in 0..=reached {
-                let support = knots[degree + 1 + i] - knots[degree + i - reached];
-                let slope = (reached as f64 + 1.0) * (self.values[i] / support);
-                self.values[i] = from_left - slope;
-                from_left = slope;
-            }
-            self.values[reached + 1] = from_left;
+        // Nearly all are values of cubic ones: loops whose lengths the compiler knows.
+        match (self.count - 1, to) {
+            (3, 3) => raise(&mut self.values, &knots[..8], x, 3, 3),
+            (degree, to) => raise(&mut self.values, knots, x, degree, to),
         }
         if self.values().iter().all(|value| value.is_finite()) {
             Ok(())
         } else {
             Err(DomainError::Overflow { result: "a derivative of a B-spline" })
         }
+    }
+}
+
+/// The recurrences of [`Active::raise`].
+#[expect(clippy::inline_always, reason = "its loops' lengths are known where it is inlined")]
+#[inline(always)]
+fn raise(values: &mut [f64; DEGREE_MAX + 1], knots: &[f64], x: f64, degree: usize, to: usize) {
+    values[0] = 1.0;
+    // x lies between the knots at places `degree` and `degree + 1`.
+    for reached in 0..to {
+        let mut from_left = 0.0;
+        for i in 0..=reached {
+            let right = knots[degree + 1 + i] - x;
+            let left = x - knots[degree + i - reached];
+            let share = values[i] / (right + left);
+            values[i] = from_left + right * share;
+            from_left = left * share;
+        }
+        values[reached + 1] = from_left;
+    }
+    // A value that is all of 1 may be an ulp above it.
+    values[..=to].iter_mut().for_each(|value| *value = value.min(1.0));
+    // B'ᵢ of degree q + 1 is (q + 1)(Bᵢ/(tᵢ₊q₊₁ - tᵢ) - Bᵢ₊₁/(tᵢ₊q₊₂ - tᵢ₊₁)) of degree q.
+    for reached in to..degree {
+        let mut from_left = 0.0;
+        for i in 0..=reached {
+            let support = knots[degree + 1 + i] - knots[degree + i - reached];
+            let slope = (reached as f64 + 1.0) * (values[i] / support);
+            values[i] = from_left - slope;
+            from_left = slope;
+        }
+        values[reached + 1] = from_left;
     }
 }

@@ -132,6 +132,7 @@ impl BSpline {
     /// The same for the derivatives of an order; 0 all of them above the degree. Where a derivative
     /// jumps it is that from the right (at the domain's end: from the left). An error where it is
     /// beyond the largest double.
+    #[inline]
     pub fn nonzero_derivatives(&self, x: f64, order: usize) -> Result<Active, DomainError> {
         let x = self.reduced(x)?;
         let span = self.span(x);
