@@ -14,6 +14,7 @@
 use crate::basis::{Basis, dot};
 use crate::choice::{Candidate, Choice, Chosen};
 use crate::derive::Zone;
+use crate::field::field_of;
 use crate::{Chart, Fit, FitError, Optics, Penalised, Ray, Readings};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -32,7 +33,7 @@ struct Other {
 
 impl Fit {
     /// The fit with what is not known where nothing was measured in every u, by other functions that
-    /// do about as well. To be called with what the fit was made of. Costs a fit for each of them; a
+    /// do about as well. To be called with what the fit was made of. Costs a fit without its u for each of them; a
     /// fit whose functions were pinned has none, and stays as it is.
     pub(crate) fn with_extrapolation(
         self,
@@ -46,9 +47,8 @@ impl Fit {
         }
         let region = *self.region();
         let other = |model: &Penalised| -> Result<Other, FitError> {
-            let fit = crate::fit_readings(readings, &region, *model, optics)?;
-            let basis = Basis::new(model.basis, region)?;
-            Ok(Other { basis, coefficients: fit.coefficients().to_vec() })
+            let (basis, coefficients) = field_of(readings, &region, *model, optics)?;
+            Ok(Other { basis, coefficients })
         };
         // One that can't be fitted to all readings says nothing.
         let others = others.iter().flat_map(other).collect();

@@ -35,6 +35,8 @@ pub struct Influence {
     pub(crate) values: Vec<f64>,
     /// What one u of each nuisance does to them.
     pub(crate) columns: Vec<Vec<f64>>,
+    /// The same of each component that was carried along, by name.
+    pub(crate) sides: Vec<(String, Vec<f64>)>,
     watched: Watched,
 }
 
@@ -66,8 +68,14 @@ impl Influence {
             stated: settled.stated.clone(),
             values: settled.values.clone(),
             columns: settled.columns.clone(),
+            sides: Vec::new(),
             watched,
         }
+    }
+
+    /// With what one u of each component that was carried along does to the samples.
+    pub(crate) fn with_sides(self, sides: Vec<(String, Vec<f64>)>) -> Self {
+        Self { sides, ..self }
     }
 
     /// Of the same samples under other variances.

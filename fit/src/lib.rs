@@ -84,6 +84,7 @@ mod error;
 mod estimate;
 mod excess;
 mod extrapolation;
+mod field;
 mod fitted;
 mod functional;
 mod grid;

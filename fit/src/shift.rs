@@ -41,7 +41,7 @@ pub enum Shift {
 
 impl Shift {
     /// Whether samples share it, so that it does not average away.
-    pub(crate) fn is_shared(&self) -> bool {
+    pub fn is_shared(&self) -> bool {
         !matches!(self, Self::Jitter(_))
     }
 }

@@ -136,12 +136,12 @@ pub fn fit_readings(
     let weighed = weighed(readings, &settled, fitted);
     let own = nuisances.iter().zip(own);
     shifts.extend(own.map(|(c, shift)| CommonShift { name: c.name.clone(), shift }));
-    let region = *region;
-    let truncation = None;
+    let (region, truncation) = (*region, None);
     let parts = Parts { region, model, coefficients, factor, shifts, quality, truncation };
     let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
     let (watched, whole) = (Watched::of(&fit), packed(&inverse, 1.0));
-    let influence = Influence::of(&design, &settled, &solved, &whole, watched);
+    let sides = shifting.iter().map(|common| common.name.clone()).zip(sides).collect();
+    let influence = Influence::of(&design, &settled, &solved, &whole, watched).with_sides(sides);
     let measured = Some(Measured::of(samples));
     Ok(fit.with_influence(influence).with_weighed(weighed).with_measured(measured))
 }
@@ -167,7 +167,7 @@ pub(crate) fn check_readings(readings: &Readings<'_>) -> Result<(), FitError> {
 }
 
 /// What no longer counts may have been all that was known of a coefficient.
-fn all_determined(
+pub(crate) fn all_determined(
     design: &Design<'_>,
     solution: &Solution,
     settled: &Settled,

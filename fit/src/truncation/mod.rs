@@ -31,6 +31,7 @@ mod wider;
 use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::grid::Grid;
+use crate::influence::Influence;
 use crate::solve::{levels, needs_a_side, sensitivities};
 use crate::weights::{Settled, has_unknown};
 use crate::{Angular, BasisSpec, Common, Fit, FitError, Position, Ray, Sample};
@@ -90,7 +91,7 @@ impl Fit {
         let beyond = Design::new(samples, wider.beyond(), optics)?.in_flight(flown);
         let (variances, stated) = (&influence.variances, &influence.stated);
         let heard = Heard {
-            sides: wider.sides(&own, &influence.columns, common)?,
+            sides: wider.kept_sides(influence)?,
             own: &own,
             beyond,
             values: &influence.values,
@@ -137,7 +138,16 @@ impl Shared {
         shared
     }
 
-    /// The change of every value by one u of each; `columns` are those of what was fitted along.
+    /// The change of every value by one u of each, as the fit found it.
+    fn kept_sides(&self, influence: &Influence) -> Result<Vec<Vec<f64>>, FitError> {
+        let named = |name: &String| {
+            let side = influence.sides.iter().find(|(own, _)| own == name);
+            side.map(|(_, side)| side.clone()).ok_or(FitError::Common { name: name.clone() })
+        };
+        influence.columns.iter().cloned().map(Ok).chain(self.names.iter().map(named)).collect()
+    }
+
+    /// The same of some samples; `columns` are those of what was fitted along.
     fn sides(
         &self,
         fit: &Fit,

@@ -7,6 +7,7 @@ use super::look::{Look, Rows};
 use super::{Finer, Shared, Truncation};
 use crate::basis::{Basis, dot};
 use crate::beam::design::Design;
+use crate::influence::Influence;
 use crate::parts::Parts;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
@@ -109,8 +110,12 @@ impl<'f> Wider<'f> {
         &self.kept
     }
 
-    /// The change of every value by one u of what samples share; `columns` are those of what was fitted
-    /// along.
+    /// The change of every value by one u of what samples share, as the fit found it.
+    pub(crate) fn kept_sides(&self, influence: &Influence) -> Result<Vec<Vec<f64>>, FitError> {
+        self.shared.kept_sides(influence)
+    }
+
+    /// The same of some samples; `columns` are those of what was fitted along.
     pub(crate) fn sides(
         &self,
         own: &Design<'_>,

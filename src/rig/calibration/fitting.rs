@@ -62,6 +62,23 @@ impl Calibrated {
         fit::fit_valued(&input.readings(&flown), region, wish, optics)
     }
 
+    /// The same values, with nothing in u of what readings share: to carry that along is half of a fit.
+    pub fn fit_field(
+        &self,
+        region: &Region,
+        wish: &Wish,
+        optics: Option<&Optics>,
+    ) -> Result<Ruled, FitError> {
+        let mut input = self.fit_input(&wish.rules);
+        demand_drift(input.drift.as_ref(), &wish.rules)?;
+        if wish.rules.symmetry.is_none() {
+            // A symmetry is tested against all of u.
+            input.common.retain(|common| !common.shift.is_shared());
+        }
+        let flown = self.flown(&input);
+        fit::fit_valued(&input.readings(&flown), region, wish, optics)
+    }
+
     /// As [`fit`](Self::fit) with a basis and a penalty that are known, or were chosen before.
     pub fn fit_known(
         &self,

@@ -40,7 +40,7 @@ pub(super) fn checked(
     let seen: Vec<Sample> =
         samples.filter(|(place, _)| !is_held(*place)).map(|(_, sample)| sample.clone()).collect();
     let rest = Calibrated { samples: seen, ..calibrated.clone() };
-    let ruled = rest.fit_valued(&terms.region, &terms.plan.fit, terms.optics.as_ref())?;
+    let ruled = rest.fit_field(&terms.region, &terms.plan.fit, terms.optics.as_ref())?;
     let Ruled { fit, choice, .. } = ruled;
     let squares: Vec<f64> = checks
         .iter()
