@@ -15,7 +15,7 @@ use crate::basis::{Basis, dot};
 use crate::choice::{Candidate, Choice, Chosen};
 use crate::derive::Zone;
 use crate::field::field_of;
-use crate::{Chart, Fit, FitError, Optics, Penalised, Ray, Readings};
+use crate::{Chart, Fit, Optics, Penalised, Ray, Readings};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The fields that other functions make of the readings.
@@ -46,13 +46,15 @@ impl Fit {
             return self;
         }
         let region = *self.region();
-        let other = |model: &Penalised| -> Result<Other, FitError> {
-            let (basis, coefficients) = field_of(readings, &region, *model, optics)?;
-            Ok(Other { basis, coefficients })
-        };
         // One that can't be fitted to all readings says nothing.
-        let others = others.iter().flat_map(other).collect();
-        self.extrapolated(Extrapolation { others })
+        let field = |model: &Penalised| field_of(readings, &region, *model, optics).ok();
+        self.doubted_by(others.iter().filter_map(field).collect())
+    }
+
+    /// The same by other functions' fields of the same readings.
+    pub(crate) fn doubted_by(self, fields: Vec<(Basis, Vec<f64>)>) -> Self {
+        let other = |(basis, coefficients)| Other { basis, coefficients };
+        self.extrapolated(Extrapolation { others: fields.into_iter().map(other).collect() })
     }
 
     /// What a sum over rays has of each component.
@@ -149,7 +151,12 @@ impl Choice {
     /// The chosen model, and of what was tried beside it the best of each kind of functions of direction
     /// that foretold the readings left out about as well.
     pub fn chosen(&self) -> Option<Chosen> {
-        let (chosen, others) = self.candidates.split_first()?;
+        Some(Chosen { model: self.candidates.first()?.model, others: self.others() })
+    }
+
+    /// Those beside the chosen model.
+    pub fn others(&self) -> Vec<Penalised> {
+        let Some((chosen, others)) = self.candidates.split_first() else { return Vec::new() };
         let mut others: Vec<&Candidate> =
             others.iter().filter(|other| other.score > -AS_LIKELY).collect();
         others.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -161,7 +168,7 @@ impl Choice {
                 found.push(other.model);
             }
         }
-        Some(Chosen { model: chosen.model, others: found })
+        found
     }
 }
 

@@ -25,28 +25,51 @@ struct Map {
     has_gaps: bool,
 }
 
+/// Where samples of any number lie, taken in block by block in bounded memory: a direction is known by
+/// its cell.
+#[derive(Debug)]
+pub(crate) struct Looked {
+    places: BTreeSet<(i64, i64)>,
+    width_rad: f64,
+}
+
+impl Looked {
+    pub(crate) fn new() -> Self {
+        Self { places: BTreeSet::new(), width_rad: PLACE_RAD }
+    }
+
+    /// Takes samples of finite directions in.
+    pub(crate) fn take(&mut self, samples: &[Sample]) {
+        for Sample { ray, .. } in samples {
+            self.places.insert(place((ray.theta_rad, ray.phi_rad), self.width_rad));
+            if self.places.len() > PLACES_MAX {
+                let finer = std::mem::take(&mut self.places);
+                let angles = finer.into_iter().map(|at| angles(at, self.width_rad));
+                let wider_rad = 2.0 * self.width_rad;
+                self.places = angles.map(|at| place(at, wider_rad)).collect();
+                self.width_rad = wider_rad;
+            }
+        }
+    }
+
+    pub(crate) fn measured(self) -> Measured {
+        let directions = self.places.into_iter().map(|at| angles(at, self.width_rad));
+        Measured::of_directions(directions.collect())
+    }
+}
+
 impl Measured {
     pub(crate) fn of(samples: &[Sample]) -> Self {
-        let farthest = samples.iter().map(|sample| sample.ray.theta_rad).fold(0.0, f64::max);
-        let off_pole_rad = OFF_POLE_SHARE * farthest;
-        let is_off = |theta_rad: f64| theta_rad.min(PI - theta_rad) > off_pole_rad;
-        let off = samples.iter().map(|sample| sample.ray).filter(|ray| is_off(ray.theta_rad));
-        let mut azimuths: Vec<f64> = off.map(|ray| ray.phi_rad.rem_euclid(TAU)).collect();
-        azimuths.sort_by(f64::total_cmp);
-        azimuths.dedup_by(|phi, kept| *phi - *kept < APART_RAD);
-        if azimuths.len() > 1 && azimuths[0] + TAU - azimuths[azimuths.len() - 1] < APART_RAD {
-            azimuths.pop();
-        }
-        // A reading's scatter about its direction is far below a cell of the map.
-        #[allow(clippy::cast_possible_truncation)] // angles
-        let place = |angle: f64| libm::round(angle / PLACE_RAD) as i64;
-        let places: BTreeSet<(i64, i64)> = samples
-            .iter()
-            .map(|sample| (place(sample.ray.theta_rad), place(sample.ray.phi_rad)))
-            .collect();
-        let angle = |place: i64| place as f64 * PLACE_RAD;
-        let directions = places.into_iter().map(|(theta, phi)| (angle(theta), angle(phi)));
-        Self { directions: directions.collect(), meridians: azimuths.len(), map: OnceLock::new() }
+        let place = |sample: &Sample| place((sample.ray.theta_rad, sample.ray.phi_rad), PLACE_RAD);
+        let places: BTreeSet<(i64, i64)> = samples.iter().map(place).collect();
+        let directions = places.into_iter().map(|at| angles(at, PLACE_RAD)).collect();
+        let azimuths = samples.iter().map(|sample| (sample.ray.theta_rad, sample.ray.phi_rad));
+        Self { directions, meridians: meridians(azimuths), map: OnceLock::new() }
+    }
+
+    fn of_directions(directions: Vec<(f64, f64)>) -> Self {
+        let meridians = meridians(directions.iter().copied());
+        Self { directions, meridians, map: OnceLock::new() }
     }
 
     /// With what a symmetry says of other directions; `None` where it leaves no gap to speak of.
@@ -135,6 +158,32 @@ impl Map {
     }
 }
 
+/// Distinct azimuths of directions (θ, φ) that are not too near to the pole.
+fn meridians(directions: impl Iterator<Item = (f64, f64)> + Clone) -> usize {
+    let farthest = directions.clone().map(|(theta_rad, _)| theta_rad).fold(0.0, f64::max);
+    let off_pole_rad = OFF_POLE_SHARE * farthest;
+    let off = directions.filter(|(theta_rad, _)| theta_rad.min(PI - theta_rad) > off_pole_rad);
+    let mut azimuths: Vec<f64> = off.map(|(_, phi_rad)| phi_rad.rem_euclid(TAU)).collect();
+    azimuths.sort_by(f64::total_cmp);
+    azimuths.dedup_by(|phi, kept| *phi - *kept < APART_RAD);
+    if azimuths.len() > 1 && azimuths[0] + TAU - azimuths[azimuths.len() - 1] < APART_RAD {
+        azimuths.pop();
+    }
+    azimuths.len()
+}
+
+/// The cell of a direction: a reading's scatter about its own is far below a cell of the map.
+#[allow(clippy::cast_possible_truncation)] // angles
+fn place((theta_rad, phi_rad): (f64, f64), width_rad: f64) -> (i64, i64) {
+    let place = |angle_rad: f64| libm::round(angle_rad / width_rad) as i64;
+    (place(theta_rad), place(phi_rad))
+}
+
+/// A cell's middle.
+fn angles((theta, phi): (i64, i64), width_rad: f64) -> (f64, f64) {
+    (theta as f64 * width_rad, phi as f64 * width_rad)
+}
+
 /// The direction of a cell's middle within the cone.
 fn direction(cell: usize, end_rad: f64) -> Option<(f64, f64)> {
     let t = |place: usize| 2.0 * (place as f64 + 0.5) / SIDE as f64 - 1.0;
@@ -154,3 +203,38 @@ const OFF_POLE_SHARE: f64 = 0.3;
 const APART_RAD: f64 = 1e-2;
 /// Directions closer than this (0.06°) are one.
 const PLACE_RAD: f64 = 1e-3;
+/// Cells of directions at most; beyond, of twice the width. A hemisphere is full of them at 0.7°.
+const PLACES_MAX: usize = 1 << 16;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Noise;
+
+    #[test]
+    fn many_directions_are_kept_by_wider_cells_with_the_same_gaps() {
+        let sample = |i: u32| {
+            let turned = f64::from(i) * 0.618_034;
+            // Evenly in solid angle up to 70°, but for a sector.
+            let theta_rad = libm::acos(1.0 - 0.658 * (f64::from(i) * 0.754_878).fract());
+            let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad, phi_rad: 5.0 * turned.fract() };
+            Sample { ray, value: 1.0, noise: Noise::Unknown }
+        };
+        let samples: Vec<Sample> = (0..300_000).map(sample).collect();
+        let mut looked = Looked::new();
+        samples.chunks(1000).for_each(|block| looked.take(block));
+        assert!(looked.places.len() <= PLACES_MAX && looked.width_rad > PLACE_RAD);
+        let (found, whole) = (looked.measured(), Measured::of(&samples));
+        let region = Region::surface((0.0, 0.0), (0.0, 0.0), 70_f64.to_radians());
+        for (theta_rad, phi_rad, expected) in
+            [(0.0, 0.0, true), (0.9, 2.5, true), (0.9, 5.7, false), (1.2, 4.9, true)]
+        {
+            assert_eq!(found.holds(theta_rad, phi_rad, &region), expected, "{theta_rad} {phi_rad}");
+            assert_eq!(whole.holds(theta_rad, phi_rad, &region), expected, "{theta_rad} {phi_rad}");
+        }
+        let (gap, expected) = (found.gaps(&region), whole.gaps(&region));
+        let off = gap.0.len().abs_diff(expected.0.len());
+        assert!(10 * off < expected.0.len(), "{} {}", gap.0.len(), expected.0.len());
+        assert!(found.meridians > 400, "{}", found.meridians);
+    }
+}

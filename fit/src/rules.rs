@@ -50,8 +50,7 @@ pub fn fit_wished(
     optics: Option<&Optics>,
 ) -> Result<Ruled, FitError> {
     let (fit, choice) = fit_chosen(readings, region, wish, optics)?;
-    let chosen = choice.as_ref().and_then(Choice::chosen);
-    let others = chosen.map_or(Vec::new(), |chosen| chosen.others);
+    let others = choice.as_ref().map_or_else(Vec::new, Choice::others);
     Ok(Ruled { choice, ..fit.doubted(readings, &others, &wish.rules, optics)? })
 }
 

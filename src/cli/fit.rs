@@ -11,7 +11,7 @@ use super::args::FitArgs;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::inputs::Inputs;
-use super::long_run::{self, IN_BLOCKS, NOT_DOUBTED};
+use super::long_run::{self, IN_BLOCKS};
 use super::monte_carlo::{self, Dice};
 use super::output::{note, say, write_out};
 use super::partial;
@@ -132,7 +132,7 @@ fn fit_long_run(
     (setup, reader, wish): (&Setup, &Reader, &Wish),
 ) -> Outcome {
     let made = long_run::fit(setup, reader, wish)?;
-    let notes = made.notes();
+    let notes = [IN_BLOCKS.to_owned()];
     let fit = &made.ruled.fit;
     let quantity = setup.rig.detector.quantity;
     let derived = derive::derive(fit, quantity, &setup.plan.derive);
@@ -286,15 +286,16 @@ fn fit_stream(
     let optics = optics.as_ref();
     let (model, choice) = scan.model(&args.source, (wish, optics), args.u_relative)?;
     let robust = wish.rules.robust;
-    let asked = Asked { region: scan.region, model, robust, optics, with_truncation: true };
+    let others = &choice.as_ref().map_or_else(Vec::new, fit::Choice::others);
+    let region = scan.region;
+    let asked = Asked { region, model, robust, optics, with_truncation: true, others };
     let us = (args.u_relative, args.u_scale);
     let (blockwise, treated) = scan.fit(&args.source, &asked, us)?;
     let resolves = Some(blockwise.resolves);
     let ruled = blockwise.fit.ruled(&wish.rules).map_err(|error| {
         Failure::with_help(format!("{}: {error}", args.source.display()), FIT_HELP)
     })?;
-    let mut notes = vec![note_on_u(scan.has_u, args.u_relative), IN_BLOCKS.to_owned()];
-    notes.extend(choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
+    let notes = [note_on_u(scan.has_u, args.u_relative), IN_BLOCKS.to_owned()];
     let derived = derive::derive(&ruled.fit, scan.quantity, wanted);
     let treatment = Treatment::of_readings(wish.rules.robust, treated, &[])
         .with_rules(ruled.symmetry.as_ref(), ruled.nonnegative.as_ref());

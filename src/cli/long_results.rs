@@ -28,18 +28,18 @@ pub(super) struct InBlocks {
     treated: TreatedReadings,
     nuisances: Vec<FittedNuisance>,
     /// For fit.json.
-    notes: Vec<String>,
+    notes: [String; 1],
 }
 
 impl InBlocks {
     fn of(made: &LongFit, robust: Robust) -> Self {
         let (treated, nuisances) = (made.treated.clone(), made.nuisances.clone());
-        Self { robust, treated, nuisances, notes: made.notes() }
+        Self { robust, treated, nuisances, notes: [IN_BLOCKS.to_owned()] }
     }
 
     fn without_fit() -> Self {
         let (treated, nuisances) = (TreatedReadings::default(), Vec::new());
-        Self { robust: Robust::None, treated, nuisances, notes: vec![IN_BLOCKS.to_owned()] }
+        Self { robust: Robust::None, treated, nuisances, notes: [IN_BLOCKS.to_owned()] }
     }
 
     /// What became of readings that are no plain ones.
@@ -110,7 +110,7 @@ impl Results {
     pub(super) fn remarks(&self) -> Vec<String> {
         let Some(blocks) = &self.blocks else { return Vec::new() };
         let (shown, all) = (self.calibrated.samples.len(), self.tally.measured);
-        let mut remarks = blocks.notes.clone();
+        let mut remarks = blocks.notes.to_vec();
         remarks.push(ONE_POINT.to_owned());
         if shown < all {
             remarks.push(format!(

@@ -24,9 +24,6 @@ use crate::rig::calibration::{
 /// them takes half a gigabyte.
 const RUN_KEPT_MAX: u64 = 200_000;
 pub(super) const IN_BLOCKS: &str = "read in blocks, its samples not all in memory at once";
-/// Where others than the chosen functions are not fitted.
-pub(super) const NOT_DOUBTED: &str = "u has no part for what other bases make of directions where nothing was measured (extrapolation): \
-     that takes all samples at once";
 
 /// Whether a run is read in blocks without being asked.
 pub(super) fn is_long(reader: &Reader) -> Result<bool, Failure> {
@@ -75,15 +72,6 @@ pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit
         Stopped::Source(failure) => failure,
         Stopped::Fit(error) => refused(&error),
     })
-}
-
-impl LongFit {
-    /// What files must say of it.
-    pub(super) fn notes(&self) -> Vec<String> {
-        let mut notes = vec![IN_BLOCKS.to_owned()];
-        notes.extend(self.ruled.choice.as_ref().map(|_| NOT_DOUBTED.to_owned()));
-        notes
-    }
 }
 
 /// What the last walk sums up.
@@ -173,7 +161,9 @@ impl<'a> LongRun<'a> {
         let samples = self.gleaning.clone().into_samples();
         let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())?;
         let robust = wish.rules.robust;
-        let asked = Asked { region, model, robust, optics: optics.as_ref(), with_truncation: true };
+        let others = choice.as_ref().map_or_else(Vec::new, fit::Choice::others);
+        let (optics, others) = (optics.as_ref(), others.as_slice());
+        let asked = Asked { region, model, robust, optics, with_truncation: true, others };
         let (Blockwise { fit, nuisances, resolves }, closing) = self.fit(&asked)?;
         let ruled = fit.clone().ruled(&wish.rules)?;
         let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();

@@ -138,6 +138,7 @@ impl Scan {
                 robust: Robust::None,
                 optics: None,
                 with_truncation: false,
+                others: &[],
             };
             let by_line =
                 error.index().and_then(|_| self.fit(path, &asked, (u_relative, None)).err());

@@ -2,6 +2,7 @@
 
 use std::rc::Rc;
 
+use super::doubting::doubted;
 use super::passing::{Known, Pass};
 use super::sketch::Sketch;
 use super::{Asked, Blocks, Blockwise, Told, Totals};
@@ -9,6 +10,7 @@ use crate::basis::Basis;
 use crate::beam::design::Design;
 use crate::check::check_sample;
 use crate::influence::{Influence, Watched};
+use crate::measured::Looked;
 use crate::nuisance::{Solved, packed, without};
 use crate::parts::{CommonShift, Parts};
 use crate::penalty::Prior;
@@ -21,7 +23,7 @@ use crate::triangle::Triangle;
 use crate::truncation::Widened;
 use crate::undetermined::by_functions;
 use crate::weights::{PASSES_MAX, REWEIGHING_MAX, SETTLED_RELATIVE, Settled, excess_by, shrink};
-use crate::{Common, Fit, FitError, FittedNuisance, Readings, Resolves, Robust, Shift};
+use crate::{Common, Fit, FitError, FittedNuisance, Readings, Resolves, Robust, Sample, Shift};
 
 /// Fits readings that come in blocks, as [`fit_readings`](crate::fit_readings) does readings that are
 /// there. Of weights that are settled, and of noise that is what it was said to be, it takes three walks, and for truncation one or two more; `told`
@@ -33,8 +35,11 @@ pub fn fit<B: Blocks>(
     told: &mut dyn FnMut(&Readings<'_>, &Told),
 ) -> Result<Blockwise, B::Error> {
     let fitting = Fitting::new(totals, *asked)?;
-    let mut poses = Poses::new(totals.readings, &asked.region);
-    let (triangle, shared) = fitting.first(blocks, &mut poses)?;
+    let (mut poses, mut looked) = (Poses::new(totals.readings, &asked.region), Looked::new());
+    let (triangle, shared) = fitting.first(blocks, &mut |samples| {
+        poses.take(samples);
+        looked.take(samples);
+    })?;
     let (triangle, pass) = fitting.settle(blocks, triangle, &shared)?;
     let mut tally = poses.tally();
     let (fit, nuisances) =
@@ -42,6 +47,7 @@ pub fn fit<B: Blocks>(
             tally.take(block.samples);
             told(block, of_block);
         })?;
+    let fit = doubted(fit.with_measured(Some(looked.measured())), blocks, totals, asked)?;
     let Asked { region, model, optics, .. } = asked;
     let resolves = Resolves::by(&poses, tally.kind(), region, model.basis, *optics);
     Ok(Blockwise { fit, nuisances, resolves })
@@ -65,7 +71,7 @@ pub(super) struct Shared {
 }
 
 impl<'a> Fitting<'a> {
-    fn new(totals: &Totals, asked: Asked<'a>) -> Result<Self, FitError> {
+    pub(super) fn new(totals: &Totals, asked: Asked<'a>) -> Result<Self, FitError> {
         let Asked { region, model, .. } = asked;
         if !region.is_sound() {
             return Err(FitError::Region);
@@ -113,7 +119,7 @@ impl<'a> Fitting<'a> {
     fn first<B: Blocks>(
         &self,
         blocks: &mut B,
-        poses: &mut Poses,
+        look: &mut dyn FnMut(&[Sample]),
     ) -> Result<(Triangle, Shared), B::Error> {
         let mut begun_at: Option<(Triangle, Shared)> = None;
         self.walk(blocks, |block, design| {
@@ -121,7 +127,7 @@ impl<'a> Fitting<'a> {
                 check_sample(index, sample, &self.asked.region)?;
             }
             check_block(block)?;
-            poses.take(block.samples);
+            look(block.samples);
             let (triangle, shared) = begun_at.get_or_insert_with(|| {
                 let triangle = begun(block.nuisances.len(), self.basis.len(), 0);
                 (triangle, Shared::of(block))
@@ -176,6 +182,15 @@ impl<'a> Fitting<'a> {
         }
         let pass = pass.ok_or(FitError::OutOfRange)?;
         Ok((triangle, pass))
+    }
+
+    /// The functions and their coefficients alone, without any u.
+    pub(super) fn field<B: Blocks>(self, blocks: &mut B) -> Result<(Basis, Vec<f64>), B::Error> {
+        let (triangle, shared) = self.first(blocks, &mut |_| {})?;
+        let (triangle, _) = self.settle(blocks, triangle, &shared)?;
+        let solved = solved(triangle, (shared.nuisances.len(), 0), &self.prior)?;
+        self.demand_rank(&solved)?;
+        Ok((self.basis, solved.field.unknowns(0)))
     }
 
     fn next(&self, solved: &Solved, before: Option<&Pass>, passes: usize, robust: Robust) -> Pass {

@@ -47,6 +47,7 @@
 //!     robust: Robust::Tukey,
 //!     optics: None,
 //!     with_truncation: true,
+//!     others: &[],
 //! };
 //! let field = blocks::fit(&mut Source, &totals, &asked, &mut |_, _| {})?.fit;
 //! let ray = Ray { x_m: 0.0, y_m: 0.0, theta_rad: 0.3, phi_rad: 0.0 };
@@ -62,6 +63,7 @@ use crate::{
     Robust, Weighed,
 };
 
+mod doubting;
 mod fitting;
 mod passing;
 mod sketch;
@@ -133,13 +135,15 @@ pub struct Asked<'a> {
     /// Whether u holds what the functions can't follow, as by [`Fit::with_truncation`]: one or two more
     /// walks, with rows that are two to five times as wide.
     pub with_truncation: bool,
+    /// Functions that do about as well as the model ([`Choice::chosen`](crate::Choice::chosen)): what they make of directions where
+    /// nothing was measured is in u, too. Each takes as many walks as a fit's field.
+    pub others: &'a [Penalised],
 }
 
 /// A fit of readings that are forgotten.
 #[derive(Debug, Clone)]
 pub struct Blockwise {
-    /// The field. It does not know what single readings did ([`Fit::weighed`], [`Fit::influence`]), nor
-    /// which directions were measured.
+    /// The field. It does not know what single readings did ([`Fit::weighed`], [`Fit::influence`]).
     pub fit: Fit,
     /// What was fitted along.
     pub nuisances: Vec<FittedNuisance>,

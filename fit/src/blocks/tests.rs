@@ -3,8 +3,8 @@
 use super::{Asked, Blocks, Blockwise, Totals, fit};
 use crate::scattered::{BASIS, REGION, part, reading};
 use crate::{
-    BasisSpec, Common, Fit, FitError, FittedNuisance, Limit, Noise, Penalised, Penalty, Ray,
-    Readings, Resolves, Robust, Sample, Shift, fit_readings,
+    Angular, BasisSpec, Common, Fine, Fit, FitError, FittedNuisance, Limit, Noise, Penalised,
+    Penalty, Position, Ray, Readings, Resolves, Robust, Sample, Shift, fit_readings,
 };
 
 const READINGS: usize = 2500;
@@ -85,14 +85,14 @@ const BLOCK: usize = 170;
 
 /// By blocks, and what each reading's weight, residual and influence on the exitance are.
 fn in_blocks(source: &mut Source, model: Penalised, robust: Robust) -> (Blockwise, [Vec<f64>; 3]) {
-    in_blocks_with(source, model, robust, false)
+    in_blocks_with(source, model, robust, (false, &[]))
 }
 
 fn in_blocks_with(
     source: &mut Source,
     model: Penalised,
     robust: Robust,
-    with_truncation: bool,
+    (with_truncation, others): (bool, &[Penalised]),
 ) -> (Blockwise, [Vec<f64>; 3]) {
     let mut totals = Totals::default();
     let mut look = |block: &Readings<'_>| {
@@ -101,7 +101,7 @@ fn in_blocks_with(
     };
     source.each(&mut look).unwrap();
     source.walks = 0;
-    let asked = Asked { region: REGION, model, robust, optics: None, with_truncation };
+    let asked = Asked { region: REGION, model, robust, optics: None, with_truncation, others };
     let mut each = [const { Vec::new() }; 3];
     let outcome = fit(source, &totals, &asked, &mut |_, told| {
         each[0].extend_from_slice(&told.weighed.weights);
@@ -298,7 +298,7 @@ fn assert_as_truncated(source: &mut Source, robust: Robust, tolerance: f64) {
     let plain = whole.exitance().u_independent;
     let (samples, flown, common) = (&source.samples, &source.flown, (source.common)(0));
     let whole = whole.with_truncation(samples, flown, &common, None).unwrap();
-    let (found, each) = in_blocks_with(source, BASIS.into(), robust, true);
+    let (found, each) = in_blocks_with(source, BASIS.into(), robust, (true, &[]));
     let ray = |theta_rad, phi_rad| Ray { x_m: 2e-3, y_m: -5e-3, theta_rad, phi_rad };
     let numbers = |fit: &Fit| -> Vec<f64> {
         let rays = [ray(0.0, 0.0), ray(0.5, 0.1), ray(0.8, 3.0), ray(1.35, 5.0)];
@@ -353,9 +353,48 @@ fn what_functions_cannot_follow_is_in_u_as_in_memory() {
 #[test]
 fn where_functions_follow_all_one_more_walk_finds_nothing() {
     let mut source = Source::new(stated(0.42), false);
-    let (found, _) = in_blocks_with(&mut source, BASIS.into(), Robust::None, true);
+    let (found, _) = in_blocks_with(&mut source, BASIS.into(), Robust::None, (true, &[]));
     assert_eq!(source.walks, 4);
     assert!(found.fit.parts().truncation.is_none());
+}
+
+#[test]
+fn gaps_and_what_other_functions_make_of_them_are_those_in_memory() {
+    let mut source = Source::new(stated(0.42), false);
+    (source.common, source.nuisances) = (common, nuisances);
+    add_lobe(&mut source, 6.0);
+    let is_gap = |ray: &Ray| ray.theta_rad > 1.2 || (ray.theta_rad > 0.4 && ray.phi_rad < 1.4);
+    source.samples.retain(|sample| !is_gap(&sample.ray));
+    let held = Penalty { power: 2.0, strength: 1e-3 };
+    let splines = Angular::Splines { theta_spans: 4, phi_spans: 8, fine: Fine::NONE };
+    let position = Position::Legendre { degree: 0 };
+    let others = [
+        Penalised::new(BasisSpec::zernike(7, 1), held),
+        Penalised::new(BasisSpec { angular: splines, position }, held),
+        // More functions than readings, with nothing held against them: says nothing.
+        BasisSpec::zernike(60, 1).into(),
+    ];
+    let mut whole = None;
+    source.part(0, source.samples.len(), &mut |readings| {
+        let fit = fit_readings(readings, &REGION, BASIS, None).unwrap();
+        whole = Some(fit.with_extrapolation(&others, readings, None));
+    });
+    let whole = whole.unwrap();
+    let (found, _) = in_blocks_with(&mut source, BASIS.into(), Robust::None, (false, &others));
+    let numbers = |fit: &Fit| -> Vec<f64> {
+        let row = |c: &crate::Contribution| (c.name == crate::EXTRAPOLATION).then_some(c.u);
+        let row = fit.contributions().iter().find_map(row).unwrap();
+        vec![row, fit.exitance().u, fit.intensity(0.7, 0.7).u, fit.intensity(0.7, 3.0).u]
+    };
+    let (numbers, expected) = (numbers(&found.fit), numbers(&whole));
+    for (a, b) in numbers.iter().zip(&expected) {
+        assert!((a / b - 1.0).abs() < 1e-6, "{numbers:?} {expected:?}");
+    }
+    assert!(expected[0] > 0.2 * expected[1], "{expected:?}");
+    assert!(expected[2] > 1.1 * expected[3], "{expected:?}");
+    let part = |fit: &Fit| fit.measured_fraction().unwrap();
+    assert!((part(&found.fit) - part(&whole)).abs() < 1e-12, "{}", part(&whole));
+    assert!(part(&whole) < 0.9, "{}", part(&whole));
 }
 
 #[test]
@@ -368,7 +407,14 @@ fn what_makes_no_sense_is_refused_as_in_memory() {
         };
         source.each(&mut look).unwrap();
         let robust = Robust::None;
-        let asked = Asked { region: REGION, model, robust, optics: None, with_truncation: false };
+        let asked = Asked {
+            region: REGION,
+            model,
+            robust,
+            optics: None,
+            with_truncation: false,
+            others: &[],
+        };
         fit(source, &totals, &asked, &mut |_, _| {}).unwrap_err()
     };
     let mut source = Source::new(stated(0.42), false);

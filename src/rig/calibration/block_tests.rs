@@ -104,7 +104,8 @@ fn readings_of_a_run_in_blocks_say_what_they_say_at_once() {
         };
         (&run).each(&mut count).unwrap();
         assert_eq!(totals.readings(), fitted.places.len());
-        let asked = Asked { region, model, robust, optics: None, with_truncation: false };
+        let asked =
+            Asked { region, model, robust, optics: None, with_truncation: false, others: &[] };
         let mut sums = IndependentSums::default();
         let found = blocks::fit(&mut &run, &totals, &asked, &mut |_, told| {
             let (samples, places) = &mut *run.block.borrow_mut();
