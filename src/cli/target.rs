@@ -1,9 +1,11 @@
 //! `gonio plan --target`: the cheapest plan that reaches an accuracy, and what else was looked at.
 
 use std::fmt::Write as _;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use spanned_toml::{Document, Source};
 
@@ -15,7 +17,7 @@ use super::setup::Setup;
 use super::text::{duration, percent, table};
 use crate::export::write_atomically;
 use crate::plan::{Change, Plan, rewrite};
-use crate::study::{Candidate, Considered, Demand, Found, Search, Shortfall};
+use crate::study::{Candidate, Considered, Demand, Found, Looked, Search, SearchError, Shortfall};
 
 const HELP: &str = "write for example exitance=0.5%, flux=1% or radiance=0.02";
 
@@ -36,7 +38,7 @@ pub(crate) fn plan(args: &PlanArgs, setup: &Setup) -> Outcome {
     }
     let Setup { plan, rig, list, .. } = setup;
     let search = Search { plan, rig, list: list.as_ref(), demand };
-    let found = search.run().map_err(Failure::start)?;
+    let found = look(&search).map_err(Failure::start)?;
     if let (Some(best), Some(output)) = (&found.best, &args.output) {
         write(&args.plan, plan, best, output)?;
     }
@@ -49,6 +51,24 @@ pub(crate) fn plan(args: &PlanArgs, setup: &Setup) -> Outcome {
         None => Ok(ExitCode::SUCCESS),
         Some(floor) => Err(Failure::midway(unreachable(floor, &demand))),
     }
+}
+
+/// Searches on all of the machine's threads, with a line for a terminal of how far it has come.
+fn look(search: &Search<'_>) -> Result<Found, SearchError> {
+    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(5));
+    if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} plans{msg}") {
+        bar.set_style(style);
+    }
+    let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let found = search.run(threads, &mut |Looked { done, left, best_s }| {
+        bar.set_length((done + left) as u64);
+        bar.set_position(done as u64);
+        let best = |best_s| format!("; the best so far takes {}", duration(best_s));
+        bar.set_message(best_s.map_or_else(String::new, best));
+        bar.tick();
+    });
+    bar.finish_and_clear();
+    found
 }
 
 /// Without a target there is nothing to write, nor to apply it to.

@@ -34,7 +34,7 @@ pub use parts::Budget;
 pub use prior::{Feature, Features, Prior};
 pub use rehearsal::{Likely, Rehearsed, Stated};
 pub use score::{Score, median, percent};
-pub use search::{Candidate, Considered, Found, Search, SearchError};
+pub use search::{Candidate, Considered, Found, Looked, Search, SearchError};
 pub use trend::{Reach, Trend};
 
 /// A small plan with this schedule and this fit.

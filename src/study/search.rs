@@ -7,6 +7,9 @@
 //! Every candidate is the plan's own text with some keys changed, read and laid out again: what is
 //! found is what is written.
 
+use std::collections::VecDeque;
+use std::num::NonZeroUsize;
+use std::panic::resume_unwind;
 use std::time::Duration;
 
 use spanned_toml::{Problem, Source};
@@ -100,9 +103,25 @@ struct Variant {
     least_s: f64,
 }
 
+/// How far a search has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looked {
+    /// Plans that were looked at, or left out.
+    pub done: usize,
+    /// Those that are to be looked at, as far as is known.
+    pub left: usize,
+    /// Rig time of the best so far that reaches all targets, seconds.
+    pub best_s: Option<f64>,
+}
+
 impl Search<'_> {
-    /// Looks for it. The error is the plan's own: of its layout, or of its fit.
-    pub fn run(&self) -> Result<Found, SearchError> {
+    /// Looks for it, at so many plans at once as `threads` says; what is found does not depend on that.
+    /// `watch` hears after every few plans. The error is the plan's own: of its layout, or of its fit.
+    pub fn run(
+        &self,
+        threads: NonZeroUsize,
+        watch: &mut dyn FnMut(Looked),
+    ) -> Result<Found, SearchError> {
         let itself = self.itself()?;
         let meets = self.demand.ratio(&itself.forecast) <= 1.0;
         let mut found = Found {
@@ -112,24 +131,33 @@ impl Search<'_> {
             floor: None,
         };
         let mut nearest = itself;
-        let mut variants = std::collections::VecDeque::from(self.variants());
-        while let Some(variant) = variants.pop_front() {
-            if found.best.as_ref().is_some_and(|best| variant.least_s >= best.time_s) {
-                found.dearer += 1;
-                continue;
-            }
-            let Some((candidate, meets)) = self.shortest(&variant) else { continue };
-            found.considered.push(self.considered(&candidate, meets));
-            if meets {
-                if found.best.as_ref().is_none_or(|best| candidate.time_s < best.time_s) {
-                    variants.extend(self.with_dwells_where_they_count(&variant));
-                    found.best = Some(candidate);
+        let mut variants = VecDeque::from(self.variants());
+        let mut done = 0;
+        while !variants.is_empty() {
+            let (best_s, left) = (found.best.as_ref().map(|best| best.time_s), variants.len());
+            watch(Looked { done, left, best_s });
+            let next: Vec<Variant> = variants.drain(..threads.get().min(left)).collect();
+            done += next.len();
+            // One that turns out to be dearer than another of these was looked at in vain.
+            let looked = self.shortest_of(&next, best_s);
+            for (variant, looked) in next.iter().zip(looked) {
+                if found.best.as_ref().is_some_and(|best| variant.least_s >= best.time_s) {
+                    found.dearer += 1;
+                    continue;
                 }
-                continue;
-            }
-            variants.extend(self.in_longer_dark(&variant, &candidate));
-            if self.demand.ratio(&candidate.forecast) < self.demand.ratio(&nearest.forecast) {
-                nearest = candidate;
+                let Some((candidate, meets)) = looked else { continue };
+                found.considered.push(self.considered(&candidate, meets));
+                if meets {
+                    if found.best.as_ref().is_none_or(|best| candidate.time_s < best.time_s) {
+                        variants.extend(self.with_dwells_where_they_count(variant));
+                        found.best = Some(candidate);
+                    }
+                    continue;
+                }
+                variants.extend(self.in_longer_dark(variant, &candidate));
+                if self.demand.ratio(&candidate.forecast) < self.demand.ratio(&nearest.forecast) {
+                    nearest = candidate;
+                }
             }
         }
         if found.best.is_none() {
@@ -271,6 +299,24 @@ impl Search<'_> {
         if is_grid && is_known { Motion::Sweep.changes(plan) } else { None }
     }
 
+    /// [`shortest`](Self::shortest) of each, but for those that take longer than the best, one to a thread.
+    fn shortest_of(
+        &self,
+        variants: &[Variant],
+        best_s: Option<f64>,
+    ) -> Vec<Option<(Candidate, bool)>> {
+        let is_dearer = |variant: &Variant| best_s.is_some_and(|best_s| variant.least_s >= best_s);
+        let one = |variant: &Variant| {
+            if is_dearer(variant) { None } else { self.shortest(variant) }
+        };
+        std::thread::scope(|scope| {
+            let begin = |variant| scope.spawn(move || one(variant));
+            let threads: Vec<_> = variants.iter().map(begin).collect();
+            let ended = threads.into_iter().map(std::thread::ScopedJoinHandle::join);
+            ended.map(|found| found.unwrap_or_else(|panic| resume_unwind(panic))).collect()
+        })
+    }
+
     /// The variant with the shortest dwell that reaches all targets, or with the longest if none
     /// does, and whether it does.
     fn shortest(&self, variant: &Variant) -> Option<(Candidate, bool)> {
@@ -372,4 +418,41 @@ fn rounded_up(dwell_ms: f64) -> f64 {
     let decimals = 2.0 - libm::floor(libm::log10(dwell_ms));
     let factor = libm::pow(10.0, decimals.clamp(0.0, 3.0));
     libm::ceil(dwell_ms * factor - 1e-6) / factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::plan_by;
+
+    #[test]
+    fn what_is_found_does_not_depend_on_how_many_are_looked_at_at_once() {
+        let raster =
+            "kind = \"raster\"\nx_count = 2\ny_count = 2\ntheta_step_deg = 20\nphi_step_deg = 30";
+        let plan = plan_by(raster, "angular_degree = 4\nposition_degree = 1");
+        let rig = Rig::built_in().unwrap();
+        let demand = Demand { radiance: Some(8e-6), without_scale: true, ..Demand::default() };
+        let search = Search { plan: &plan, rig: &rig, list: None, demand };
+        let found = |threads: usize| {
+            let mut heard = Vec::new();
+            let threads = NonZeroUsize::new(threads).unwrap();
+            let found = search.run(threads, &mut |looked| heard.push(looked)).unwrap();
+            (found, heard)
+        };
+        let (one, heard) = found(1);
+        let best = one.best.clone().unwrap();
+        assert!(one.considered.len() > 1 && one.dearer > 5, "{:?}", one.considered);
+        let last = heard.last().unwrap();
+        assert!(last.best_s == Some(best.time_s) && last.done >= one.considered.len() - 1);
+        for threads in [2, 5, 100] {
+            let (several, _) = found(threads);
+            assert_eq!(several.considered, one.considered, "{threads}");
+            assert_eq!(several.dearer, one.dearer, "{threads}");
+            let again = several.best.unwrap();
+            assert_eq!(
+                (again.text, again.time_s.to_bits()),
+                (best.text.clone(), best.time_s.to_bits())
+            );
+        }
+    }
 }
