@@ -3,16 +3,18 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use fit::{EXTRAPOLATION, Estimate, Fit, TRUNCATION};
+use fit::{Contribution, EXTRAPOLATION, Estimate, Fit, TRUNCATION};
 use serde::{Deserialize, Serialize};
 
 use super::{Account, State, dark};
 use crate::study::percent;
 
-/// A fit that stays this far above what lies between the sweeps, twice, can't follow them ...
+/// A fit that stays this far above what lies between the sweeps can't follow them ...
 const STUCK: f64 = 2.0;
-/// ... if a round did not bring its error down to this part.
+/// ... if none of so many rounds brought its error down to this part of what it was before them. One round
+/// alone may bring checks to where the field is rough, or too few sweeps for the functions that follow it.
 const STUCK_GAIN: f64 = 0.9;
+const STUCK_ROUNDS: usize = 2;
 /// How the dark level's rows of a budget begin.
 const DARK: &str = "dark ";
 
@@ -77,16 +79,22 @@ impl State<'_> {
         let fit = self.whole.as_ref();
         let shape = fit.map(|fit| fit.without_scale(&self.calibrated.scales()));
         let of_exitance = [
-            (adaptive.exitance_relative, fit, "exitance"),
+            (
+                adaptive.exitance_relative,
+                fit.map(|fit| (fit.exitance(), fit.contributions())),
+                "exitance",
+            ),
             (
                 adaptive.exitance_within_region_relative,
-                shape.as_ref(),
-                "exitance without the scale",
+                shape.map(|fit| (fit.exitance_within_region(), fit.contributions_within_region())),
+                "exitance within the region without the scale",
             ),
         ];
-        for (asked, fit, what) in of_exitance {
-            if let (Some(asked), Some(fit)) = (asked, fit)
-                && let Some((name, shared)) = self.shared(fit)
+        // Of a fit that does not follow the field yet, poses seem to matter more than they do.
+        let is_followed = adaptive.radiance_relative.is_none_or(|asked| follows(asked, account));
+        for (asked, found, what) in of_exitance.into_iter().filter(|_| is_followed) {
+            if let (Some(asked), Some((estimate, parts))) = (asked, found)
+                && let Some((name, shared)) = self.shared(estimate.value, parts)
                 && shared > asked
             {
                 let (asked, u) = (percent(asked), percent(shared));
@@ -96,20 +104,7 @@ impl State<'_> {
             }
         }
         let asked = self.terms.adaptive.radiance_relative?;
-        let (checked, between) = (account.checked_relative?, account.between_relative?);
-        let before = self.before.last()?;
-        let (last, last_between) = (before.checked_relative?, before.between_relative?);
-        // What the checks' own noise may have added to it does not speak against the functions.
-        let upper = account.checked_upper_relative.unwrap_or(checked);
-        let least = libm::sqrt((2.0 * checked * checked - upper * upper).max(0.0));
-        let is_stuck = least > asked
-            && between <= asked
-            && least > STUCK * between
-            && last > STUCK * last_between
-            && checked > STUCK_GAIN * last;
-        if !is_stuck {
-            return None;
-        }
+        let checked = account.checked_relative.filter(|_| is_stuck(asked, account, self.before))?;
         let why = format!(
             "radiance to {} can't be reached by more sweeps: the fit's functions stay {} off",
             percent(asked),
@@ -118,11 +113,10 @@ impl State<'_> {
         not_met(why, largest(account))
     }
 
-    /// The exitance's uncertainty by what all readings share, however many there are, and the largest
-    /// part of it.
-    fn shared(&self, fit: &Fit) -> Option<(String, f64)> {
-        let value = fit.exitance().value;
-        let mut parts = fit.contributions().split_off(1);
+    /// The relative uncertainty of an exitance by what all readings share, however many there are, and the
+    /// largest part of it. `budget` has the independent part first.
+    fn shared(&self, value: f64, mut budget: Vec<Contribution>) -> Option<(String, f64)> {
+        let mut parts = budget.split_off(1);
         let dark = dark::known(self.calibrated);
         let lessens = dark.is_some_and(|dark| dark::is_noise(self.terms, dark));
         // More sweeps lessen these.
@@ -176,4 +170,91 @@ pub(super) fn largest(account: &Account) -> Option<(String, f64)> {
     } else {
         ("what lies between the sweeps".to_owned(), between)
     })
+}
+
+/// Whether the checks are met as well as is asked, or nearly as well as what lies between the sweeps; true
+/// where there are none.
+fn follows(asked: f64, account: &Account) -> bool {
+    let between = account.between_relative.unwrap_or(0.0);
+    account.checked_relative.is_none_or(|checked| checked <= asked.max(STUCK * between))
+}
+
+/// Whether the checks say that more sweeps won't bring the radiance to what is asked: the fit's functions
+/// stay far off what lies between the sweeps.
+fn is_stuck(asked: f64, account: &Account, before: &[Account]) -> bool {
+    let (Some(checked), Some(between)) = (account.checked_relative, account.between_relative)
+    else {
+        return false;
+    };
+    // What the checks' own noise may have added to it does not speak against the functions.
+    let upper = account.checked_upper_relative.unwrap_or(checked);
+    let least = libm::sqrt((2.0 * checked * checked - upper * upper).max(0.0));
+    let is_no_better = |account: &Account| {
+        let (error, between) = (account.checked_relative, account.between_relative);
+        error
+            .zip(between)
+            .is_some_and(|(error, between)| error > STUCK * between && checked > STUCK_GAIN * error)
+    };
+    let rounds = before.len().checked_sub(STUCK_ROUNDS).map(|first| &before[first..]);
+    least > asked
+        && between <= asked
+        && least > STUCK * between
+        && rounds.is_some_and(|rounds| rounds.iter().all(is_no_better))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::adaptive::Gaps;
+
+    const GAPS: Gaps =
+        Gaps { arc_deg: 5.0, arc_at_a_place_deg: 5.0, x_mm: 1.0, y_mm: 1.0, window_deg: 1.0 };
+
+    /// Rounds by what lies between the sweeps and what the checks say.
+    fn rounds(found: &[(f64, Option<f64>)]) -> Vec<Account> {
+        let account = |(round, (between, checked)): (usize, &(f64, Option<f64>))| Account {
+            round: u32::try_from(round).unwrap() + 1,
+            sweeps: 30,
+            checks: 7,
+            rig_s: 100.0,
+            between_relative: Some(*between),
+            checked_relative: *checked,
+            checked_upper_relative: checked.map(|checked| 1.1 * checked),
+            noise_relative: None,
+            exitance_u_relative: None,
+            exitance_within_region_u_relative: None,
+            dark_relative: None,
+            gaps: GAPS,
+            verdict: None,
+        };
+        found.iter().enumerate().map(account).collect()
+    }
+
+    #[test]
+    fn a_fit_that_checks_do_not_bear_out_does_not_follow_yet() {
+        let follows_at = |found| follows(0.02, &rounds(&[found])[0]);
+        assert!(follows_at((0.05, None)) && follows_at((0.001, Some(0.019))));
+        assert!(follows_at((0.02, Some(0.035))));
+        assert!(!follows_at((0.0176, Some(0.0426))) && !follows_at((0.001, Some(0.021))));
+    }
+
+    #[test]
+    fn more_sweeps_are_given_up_when_two_rounds_brought_nothing() {
+        let is_stuck_at = |found: &[(f64, Option<f64>)]| {
+            let accounts = rounds(found);
+            let (last, before) = accounts.split_last().unwrap();
+            is_stuck(0.02, last, before)
+        };
+        let far = |checked: f64| (0.01, Some(checked));
+        assert!(is_stuck_at(&[far(0.07), far(0.07), far(0.07)]));
+        assert!(is_stuck_at(&[(0.05, None), far(0.07), far(0.072), far(0.066)]));
+        // A ridge that later rounds followed: checks came to where it is.
+        assert!(!is_stuck_at(&[(0.0176, Some(0.0426)), (0.0124, Some(0.077))]));
+        assert!(!is_stuck_at(&[(0.0176, Some(0.0664)), (0.0131, Some(0.0622)), far(0.0526)]));
+        // Getting better, not far above what lies between, or nearly there.
+        assert!(!is_stuck_at(&[far(0.09), far(0.08), far(0.07)]));
+        assert!(!is_stuck_at(&[far(0.07), (0.04, Some(0.07)), far(0.07)]));
+        assert!(!is_stuck_at(&[far(0.021), far(0.021), far(0.021)]));
+        assert!(!is_stuck_at(&[far(0.07), far(0.07)]) && !is_stuck_at(&[far(0.07)]));
+    }
 }
