@@ -235,6 +235,7 @@ mod tests {
         let (gap, expected) = (found.gaps(&region), whole.gaps(&region));
         let off = gap.0.len().abs_diff(expected.0.len());
         assert!(10 * off < expected.0.len(), "{} {}", gap.0.len(), expected.0.len());
-        assert!(found.meridians > 400, "{}", found.meridians);
+        // More than the finest functions of a fit ask for.
+        assert!(found.meridians > 250, "{}", found.meridians);
     }
 }
