@@ -41,14 +41,18 @@ impl Fit {
         readings: &Readings<'_>,
         optics: Option<&Optics>,
     ) -> Self {
-        let is_between_planes = matches!(self.region().chart, Chart::TwoPlane { .. });
-        if others.is_empty() || is_between_planes {
+        if !self.is_doubted_by(others) {
             return self;
         }
         let region = *self.region();
         // One that can't be fitted to all readings says nothing.
         let field = |model: &Penalised| field_of(readings, &region, *model, optics).ok();
         self.doubted_by(others.iter().filter_map(field).collect())
+    }
+
+    /// Whether other functions may say anything: directions between two planes fill no cone.
+    pub(crate) fn is_doubted_by(&self, others: &[Penalised]) -> bool {
+        !(others.is_empty() || matches!(self.region().chart, Chart::TwoPlane { .. }))
     }
 
     /// The same by other functions' fields of the same readings.

@@ -12,7 +12,7 @@ pub(super) fn doubted<B: Blocks>(
     totals: &Totals,
     asked: &Asked<'_>,
 ) -> Result<Fit, B::Error> {
-    if asked.others.is_empty() {
+    if !fit.is_doubted_by(asked.others) {
         return Ok(fit);
     }
     let mut fields = Vec::with_capacity(asked.others.len());

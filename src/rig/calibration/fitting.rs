@@ -56,13 +56,10 @@ impl Calibrated {
         wish: &Wish,
         optics: Option<&Optics>,
     ) -> Result<Ruled, FitError> {
-        let input = self.fit_input(&wish.rules);
-        demand_drift(input.drift.as_ref(), &wish.rules)?;
-        let flown = self.flown(&input);
-        fit::fit_valued(&input.readings(&flown), region, wish, optics)
+        self.valued(&self.fit_input(&wish.rules), region, wish, optics)
     }
 
-    /// The same values, with nothing in u of what readings share: to carry that along is half of a fit.
+    /// The same values, with nothing in u of what readings share: to carry that along takes long.
     pub fn fit_field(
         &self,
         region: &Region,
@@ -70,12 +67,22 @@ impl Calibrated {
         optics: Option<&Optics>,
     ) -> Result<Ruled, FitError> {
         let mut input = self.fit_input(&wish.rules);
-        demand_drift(input.drift.as_ref(), &wish.rules)?;
         if wish.rules.symmetry.is_none() {
             // A symmetry is tested against all of u.
             input.common.retain(|common| !common.shift.is_shared());
         }
-        let flown = self.flown(&input);
+        self.valued(&input, region, wish, optics)
+    }
+
+    fn valued(
+        &self,
+        input: &FitInput,
+        region: &Region,
+        wish: &Wish,
+        optics: Option<&Optics>,
+    ) -> Result<Ruled, FitError> {
+        demand_drift(input.drift.as_ref(), &wish.rules)?;
+        let flown = self.flown(input);
         fit::fit_valued(&input.readings(&flown), region, wish, optics)
     }
 
