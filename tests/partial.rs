@@ -267,11 +267,17 @@ fn a_share_is_looked_at_once_and_refuses_what_takes_more() {
 
 #[test]
 fn a_run_is_a_share_too() {
-    let bench = Bench::small();
+    // More than a block of readings.
+    let bench = Bench::small().with("plan.toml", "phi_step_deg = 45", "phi_step_deg = 10").with(
+        "plan.toml",
+        "theta_step_deg = 20",
+        "theta_step_deg = 10",
+    );
     bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
     bench.gonio(&["fit", "out", "--partial", "-o", "out.bin"]).well();
     let merged = bench.gonio(&["fit", "--merge", "out.bin", "--json"]).well().json();
     let whole = bench.json("out/fit.json");
+    assert!(merged["n_used"].as_u64().unwrap() > 1024, "{}", merged["n_used"]);
     assert_eq!(merged["region"], whole["region"]);
     for key in ["coefficients", "covariance", "n_used", "dof", "n_flagged", "n_excluded"] {
         assert_close(&merged[key], &whole[key], 1e-6);

@@ -70,8 +70,8 @@ impl Results {
         wish: &Wish,
         reader: &Reader,
     ) -> Result<(Self, Vec<Reading>), Failure> {
-        let run = LongRun::open(setup, reader, wish)?;
-        let made = match run.fit_wished(setup, wish) {
+        let run = LongRun::open(&setup.rig, reader, &wish.rules)?;
+        let made = match run.fit_wished(&fit_region(setup), optics(setup).as_ref(), wish) {
             Ok(made) => Ok(made),
             Err(Stopped::Fit(error)) => Err(error),
             Err(Stopped::Source(failure)) => return Err(failure),

@@ -5,7 +5,10 @@
 use std::cell::RefCell;
 
 use fit::blocks::{Asked, Blocks, Blockwise, Totals};
-use fit::{FitError, Gleaning, Optics, Readings, Resolves, Ruled, Wish};
+use fit::partial::Partial;
+use fit::{
+    FitError, Gleaning, Optics, Penalised, Readings, Region, Resolves, Robust, Ruled, Rules, Wish,
+};
 
 use super::failure::Failure;
 use super::fit::FIT_HELP;
@@ -14,11 +17,11 @@ use super::setup::Setup;
 use super::stream::{self, KEPT_MAX, Stopped};
 use crate::export::TreatedReadings;
 use crate::journal::Reader;
-use crate::rig::Reading;
 use crate::rig::calibration::{
     Calibrated, Calibration, Component, FirstLook, FittedDrift, Handing, IndependentParts,
-    IndependentSums, Part, Sample, Spread,
+    IndependentSums, Part, Reference, Sample, Spread,
 };
+use crate::rig::{Reading, Rig};
 
 /// A run of more readings is read in blocks, by `gonio fit` and at its end: of this many all that is made of
 /// them takes half a gigabyte.
@@ -49,6 +52,8 @@ pub(super) struct LongRun<'a> {
     /// What all samples share, or all of a range or session.
     components: Vec<Component>,
     pub(super) n_samples: usize,
+    /// Those that carry a flag before anything is fitted.
+    n_flagged: usize,
     handing: Handing,
     totals: Totals,
     /// Whole sweeps of those that are no limits.
@@ -67,11 +72,47 @@ struct Block {
 
 /// Fits a run by its journal, a block at a time.
 pub(super) fn fit(setup: &Setup, reader: &Reader, wish: &Wish) -> Result<LongFit, Failure> {
-    let made = LongRun::open(setup, reader, wish)?.fit_wished(setup, wish);
-    made.map_err(|stopped| match stopped {
+    let run = LongRun::open(&setup.rig, reader, &wish.rules)?;
+    run.fit_wished(&fit_region(setup), optics(setup).as_ref(), wish).map_err(failed)
+}
+
+/// A run's share of more readings.
+pub(super) struct LongShare {
+    pub(super) partial: Partial,
+    pub(super) references: Vec<Reference>,
+    pub(super) n_flagged: usize,
+    pub(super) n_excluded: usize,
+}
+
+/// A share of a run by its journal, a block at a time.
+pub(super) fn share(
+    setup: &Setup,
+    reader: &Reader,
+    model: Penalised,
+) -> Result<LongShare, Failure> {
+    let run = LongRun::open_share(&setup.rig, reader)?;
+    let optics = optics(setup);
+    let asked = Asked {
+        region: fit_region(setup),
+        model,
+        robust: Robust::None,
+        optics: optics.as_ref(),
+        with_truncation: false,
+        others: &[],
+    };
+    let block = RefCell::<Block>::default();
+    let mut walk = Walk { run: &run, block: &block };
+    let partial = fit::blocks::share(&mut walk, &run.totals, &asked).map_err(failed)?;
+    let n_excluded = run.n_samples - run.totals.readings();
+    let LongRun { calibration, n_flagged, .. } = run;
+    Ok(LongShare { partial, references: calibration.references, n_flagged, n_excluded })
+}
+
+fn failed(stopped: Stopped) -> Failure {
+    match stopped {
         Stopped::Source(failure) => failure,
         Stopped::Fit(error) => refused(&error),
-    })
+    }
 }
 
 /// What the last walk sums up.
@@ -82,33 +123,44 @@ struct Closing {
 }
 
 impl<'a> LongRun<'a> {
-    pub(super) fn open(setup: &'a Setup, reader: &'a Reader, wish: &Wish) -> Result<Self, Failure> {
+    pub(super) fn open(rig: &'a Rig, reader: &'a Reader, rules: &Rules) -> Result<Self, Failure> {
+        Self::opened(rig, reader, Some(rules))
+    }
+
+    /// As a share of more readings, which has no rules.
+    fn open_share(rig: &'a Rig, reader: &'a Reader) -> Result<Self, Failure> {
+        Self::opened(rig, reader, None)
+    }
+
+    fn opened(rig: &'a Rig, reader: &'a Reader, rules: Option<&Rules>) -> Result<Self, Failure> {
         let mut look = FirstLook::default();
         each_block(reader, |block| {
-            block
-                .iter()
-                .try_for_each(|reading| look.take(&setup.rig, reading))
-                .map_err(Failure::midway)
+            block.iter().try_for_each(|reading| look.take(rig, reading)).map_err(Failure::midway)
         })?;
-        let calibration = look.calibration(&setup.rig).map_err(Failure::midway)?;
+        let calibration = look.calibration(rig).map_err(Failure::midway)?;
         let (mut spread, mut whole) = (Spread::default(), Spread::default());
         each_block::<Failure>(reader, |block| {
             let samples = calibration.samples(block);
             for sample in &samples {
                 whole.take(sample);
-                if sample.part() != Part::None {
+                let is_limit = sample.part() == Part::Limit;
+                if sample.part() != Part::None && !(is_limit && rules.is_none()) {
                     spread.take(sample);
                 }
             }
             Ok(())
         })?;
         let components = calibration.components(&spread);
-        let handing = Handing::new(components, &calibration.references, &spread, &wish.rules);
+        let handing = match rules {
+            Some(rules) => Handing::new(components, &calibration.references, &spread, rules),
+            None => Handing::of_share(components, &spread),
+        };
         let mut run = Self {
             reader,
             components: calibration.components(&whole),
             calibration,
             n_samples: 0,
+            n_flagged: 0,
             handing,
             totals: Totals::default(),
             gleaning: Gleaning::new(KEPT_MAX),
@@ -125,6 +177,7 @@ impl<'a> LongRun<'a> {
     fn count(&mut self, block: &[Reading]) {
         let samples = self.calibration.samples(block);
         self.n_samples += samples.len();
+        self.n_flagged += samples.iter().filter(|sample| !sample.flags.is_empty()).count();
         let input = self.handing.usable(&samples);
         self.totals.take(&input.readings(&[]));
         let is_limit = |i: usize| input.limits.binary_search(&i).is_ok();
@@ -155,15 +208,19 @@ impl<'a> LongRun<'a> {
     }
 
     /// Fits it as a plan or a person wishes.
-    pub(super) fn fit_wished(&self, setup: &Setup, wish: &Wish) -> Result<LongFit, Stopped> {
+    pub(super) fn fit_wished(
+        &self,
+        region: &Region,
+        optics: Option<&Optics>,
+        wish: &Wish,
+    ) -> Result<LongFit, Stopped> {
         self.handing.demand(&wish.rules)?;
-        let (region, optics) = (fit_region(setup), optics(setup));
         let samples = self.gleaning.clone().into_samples();
-        let (model, choice) = stream::chosen(&samples, &region, wish, optics.as_ref())?;
+        let (model, choice) = stream::chosen(&samples, region, wish, optics)?;
         let robust = wish.rules.robust;
         let others = choice.as_ref().map_or_else(Vec::new, fit::Choice::others);
-        let (optics, others) = (optics.as_ref(), others.as_slice());
-        let asked = Asked { region, model, robust, optics, with_truncation: true, others };
+        let region = *region;
+        let asked = Asked { region, model, robust, optics, with_truncation: true, others: &others };
         let (Blockwise { fit, nuisances, resolves }, closing) = self.fit(&asked)?;
         let ruled = fit.clone().ruled(&wish.rules)?;
         let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();

@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::ExitCode;
 
-use fit::partial::{Accumulator, Partial, Weighting};
+use fit::partial::{Accumulator, Weighting};
 use fit::{Optics, Penalised, Region, Robust, Rules, Wish};
 
 use super::args::FitArgs;
@@ -14,8 +14,9 @@ use super::chart::csv_help;
 use super::derive;
 use super::failure::{Failure, Outcome};
 use super::fit::{FIT_HELP, beside, optics_of, show};
+use super::long_run;
 use super::output::{note, say};
-use super::results::{fit_region, optics, read_run};
+use super::results::{open_run, optics};
 use super::text::{row, table};
 use super::wished::wished;
 use crate::export::{
@@ -24,7 +25,7 @@ use crate::export::{
 };
 use crate::plan::Wanted;
 use crate::rig::Quantity;
-use crate::rig::calibration::{FittedDrift, IndependentParts, calibrate};
+use crate::rig::calibration::{FittedDrift, IndependentParts};
 
 /// A partial fit of 4,096 coefficients and dozens of common components is far below.
 const PARTIAL_BYTES_MAX: u64 = 1 << 30;
@@ -56,26 +57,21 @@ pub(super) fn partial(args: &FitArgs) -> Outcome {
 
 fn of_run(args: &FitArgs) -> Result<PartialFile, Failure> {
     args.chart.demand_none()?;
-    let (setup, _, readings) = read_run(&args.source)?;
-    let calibrated = calibrate(&setup.rig, &readings).map_err(Failure::midway)?;
+    let (setup, _, reader) = open_run(&args.source)?;
     let wish = wished(args, setup.plan.fit)?;
     needs_one_look(&wish.rules)?;
-    if FittedDrift::of(&calibrated.references, false).is_some() {
+    let model = decided(wish)?;
+    let share = long_run::share(&setup, &reader, model)?;
+    if FittedDrift::of(&share.references, false).is_some() {
         note("note: the reference readings show a drift, which a share does not fit along");
     }
-    let model = decided(wish)?;
-    let (region, optics) = (fit_region(&setup), optics(&setup));
-    let input = calibrated.share_input();
-    let partial = Partial::of(&input.samples, &region, model, &input.common, optics.as_ref())
-        .map_err(|error| Failure::midway(format!("fit: {error}\n  help: {FIT_HELP}")))?;
-    let flagged = calibrated.samples.iter().filter(|sample| !sample.flags.is_empty()).count();
     Ok(PartialFile {
-        partial,
+        partial: share.partial,
         quantity: setup.rig.detector.quantity,
-        optics,
+        optics: optics(&setup),
         simulated: setup.rig.is_simulated(),
-        n_flagged: flagged as u64,
-        n_excluded: (calibrated.samples.len() - input.samples.len()) as u64,
+        n_flagged: share.n_flagged as u64,
+        n_excluded: share.n_excluded as u64,
     })
 }
 

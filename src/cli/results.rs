@@ -266,14 +266,7 @@ pub(crate) fn write_inputs(folder: &Path, setup: &Setup) -> Result<(), ExportErr
     Ok(())
 }
 
-/// Reads a run's folder: what it is made of, how it began, and its readings so far.
-pub(crate) fn read_run(folder: &Path) -> Result<(Setup, Header, Vec<Reading>), Failure> {
-    let (setup, header, reader) = open_run(folder)?;
-    let readings = reader.readings(Order::Taken)?;
-    Ok((setup, header, readings))
-}
-
-/// The same without the readings, and where they are to be had.
+/// Opens a run's folder: what it is made of, how it began, and where its readings are to be had.
 pub(crate) fn open_run(folder: &Path) -> Result<(Setup, Header, Reader), Failure> {
     let reader = Reader::open(&folder.join(JOURNAL))?;
     let header = reader.header()?;

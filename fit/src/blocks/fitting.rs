@@ -55,7 +55,7 @@ pub fn fit<B: Blocks>(
 
 pub(super) struct Fitting<'a> {
     pub(super) asked: Asked<'a>,
-    basis: Basis,
+    pub(super) basis: Basis,
     prior: Prior,
     pub(super) known: Known,
 }
@@ -116,7 +116,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// The walk that looks whether the readings make sense: its rows are those before anything is fitted.
-    fn first<B: Blocks>(
+    pub(super) fn first<B: Blocks>(
         &self,
         blocks: &mut B,
         look: &mut dyn FnMut(&[Sample]),
@@ -141,7 +141,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// Walks until the weights agree with the fit: their triangle, and what they follow from.
-    fn settle<B: Blocks>(
+    pub(super) fn settle<B: Blocks>(
         &self,
         blocks: &mut B,
         mut triangle: Triangle,

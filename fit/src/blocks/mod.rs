@@ -57,6 +57,7 @@
 //! ```
 
 pub use fitting::fit;
+pub use sharing::share;
 
 use crate::{
     Fit, FitError, FittedNuisance, Influence, Noise, Optics, Penalised, Readings, Region, Resolves,
@@ -66,6 +67,7 @@ use crate::{
 mod doubting;
 mod fitting;
 mod passing;
+mod sharing;
 mod sketch;
 #[cfg(test)]
 mod tests;

@@ -221,14 +221,20 @@ impl Partial {
             sums.note(sample.value, *variance);
         }
         let shared = common.iter().filter(|common| common.shift.is_shared());
-        Ok(Self {
-            basis: Basis::new(model.basis, *region)?,
-            penalty: model.penalty,
-            weighting: Weighting::Stated,
-            common: shared.map(|common| common.name.clone()).collect(),
-            sums,
-            triangle,
-        })
+        let common = shared.map(|common| common.name.clone()).collect();
+        let basis = Basis::new(model.basis, *region)?;
+        Ok(Self::weighted(basis, model.penalty, common, sums, triangle))
+    }
+
+    /// Of rows that its own fit weighted, the common components their sides.
+    pub(crate) fn weighted(
+        basis: Basis,
+        penalty: Penalty,
+        common: Vec<String>,
+        sums: Sums,
+        triangle: Triangle,
+    ) -> Self {
+        Self { basis, penalty, weighting: Weighting::Stated, common, sums, triangle }
     }
 
     /// Takes up stored parts.
@@ -306,10 +312,10 @@ fn basis_over(spec: BasisSpec, penalty: Penalty, region: Region) -> Result<Basis
 }
 
 impl Sums {
-    const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { readings: 0, value_squares: 0.0, weights: 0.0, variance: (f64::INFINITY, 0.0) };
 
-    fn note(&mut self, value: f64, variance: f64) {
+    pub(crate) fn note(&mut self, value: f64, variance: f64) {
         self.readings += 1;
         self.value_squares += value * value;
         self.weights += 1.0 / variance;

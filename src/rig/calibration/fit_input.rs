@@ -29,21 +29,10 @@ impl Calibrated {
     /// The samples as the fit takes them, with the noise that the detector's model gives, and the
     /// components that concern them.
     pub fn fit_input(&self, rules: &Rules) -> FitInput {
-        self.input(rules, |part| part != Part::None)
-    }
-
-    /// The same for a share of more readings, which is looked at once: values alone, nothing fitted
-    /// along.
-    pub fn share_input(&self) -> FitInput {
-        let rules = Rules { drift: Some(false), ranges: Some(false), ..Rules::default() };
-        self.input(&rules, |part| part == Part::Value)
-    }
-
-    fn input(&self, rules: &Rules, is_used: impl Fn(Part) -> bool) -> FitInput {
-        let used = self.samples.iter().filter(|sample| is_used(sample.part()));
-        let handing =
-            Handing::new(self.components.clone(), &self.references, &Spread::of(used), rules);
-        handing.input(&self.samples, is_used)
+        let used = self.samples.iter().filter(|sample| sample.part() != Part::None);
+        let spread = Spread::of(used);
+        Handing::new(self.components.clone(), &self.references, &spread, rules)
+            .usable(&self.samples)
     }
 }
 
@@ -56,6 +45,8 @@ pub struct Handing {
     components: Vec<(Component, bool, bool)>,
     /// By axis.
     shared: Vec<(AxisName, Shared)>,
+    /// Whether limits have no part.
+    are_values_alone: bool,
 }
 
 impl Handing {
@@ -83,7 +74,23 @@ impl Handing {
             Effect::Readback { axis } => Some((axis, Shared::of(spread, axis))),
             _ => None,
         });
-        Self { drift, shared: axes.collect(), components }
+        Self { drift, shared: axes.collect(), components, are_values_alone: false }
+    }
+
+    /// The same for a share of more readings, of such a spread of those that are values: nothing is fitted
+    /// along, and limits are left out.
+    pub fn of_share(components: Vec<Component>, spread: &Spread) -> Self {
+        let rules = Rules { drift: Some(false), ranges: Some(false), ..Rules::default() };
+        Self { are_values_alone: true, ..Self::new(components, &[], spread, &rules) }
+    }
+
+    /// Whether a sample is handed on.
+    pub fn takes(&self, sample: &Sample) -> bool {
+        match sample.part() {
+            Part::None => false,
+            Part::Limit => !self.are_values_alone,
+            Part::Value => true,
+        }
     }
 
     /// Refuses a drift that is asked for where the references don't tell it.
@@ -93,12 +100,7 @@ impl Handing {
 
     /// The samples of a part of the spread as the fit takes them, but those that have no part in it.
     pub fn usable(&self, samples: &[Sample]) -> FitInput {
-        self.input(samples, |part| part != Part::None)
-    }
-
-    fn input(&self, samples: &[Sample], is_used: impl Fn(Part) -> bool) -> FitInput {
-        let places: Vec<usize> =
-            (0..samples.len()).filter(|&i| is_used(samples[i].part())).collect();
+        let places: Vec<usize> = (0..samples.len()).filter(|&i| self.takes(&samples[i])).collect();
         let used: Arc<[Sample]> = places.iter().map(|&i| samples[i].clone()).collect();
         let limits = (0..used.len()).filter(|&i| used[i].part() == Part::Limit).collect();
         let drift = self.drift.as_ref();

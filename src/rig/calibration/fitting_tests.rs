@@ -353,7 +353,9 @@ fn a_saturated_reading_is_a_limit_and_an_unsettled_one_has_no_part() {
     let input = calibrated.fit_input(&Rules::default());
     assert_eq!(input.limits, [0, 1, 2, 3, 4]);
     assert_eq!(input.samples.len(), targets.len() - 2);
-    assert_eq!(calibrated.share_input().samples.len(), targets.len() - 7);
+    let values = calibrated.samples.iter().filter(|sample| sample.part() == Part::Value);
+    let share = Handing::of_share(calibrated.components.clone(), &Spread::of(values));
+    assert_eq!(share.usable(&calibrated.samples).samples.len(), targets.len() - 7);
     let (_, region) = region(&calibrated);
     let fitted = calibrated.fit(&region, &WISH, None).unwrap();
     assert_eq!((fitted.n_excluded, fitted.fit.n_used()), (2, targets.len() - 7));

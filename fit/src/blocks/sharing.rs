@@ -1,0 +1,37 @@
+//! A share of more readings, which is fitted by itself first, in blocks: what [`Partial::of`] makes of
+//! readings that are there.
+
+use super::fitting::Fitting;
+use super::{Asked, Blocks, Totals};
+use crate::partial::{Partial, Sums};
+use crate::solve::{absorb, begun, sensitivities};
+use crate::{Common, FitError};
+
+/// A share of the readings, weighted by its own fit, every common component carried along. Three walks where
+/// they scatter as they say; as in [`Partial::of`] no reading is an outlier, none a limit, and nothing is fitted along: of
+/// `asked` region, model and optics count.
+pub fn share<B: Blocks>(
+    blocks: &mut B,
+    totals: &Totals,
+    asked: &Asked<'_>,
+) -> Result<Partial, B::Error> {
+    let fitting = Fitting::new(totals, *asked)?;
+    let (triangle, shared) = fitting.first(blocks, &mut |_| {})?;
+    let (_, pass) = fitting.settle(blocks, triangle, &shared)?;
+    let mut triangle = begun(0, fitting.basis.len(), shared.common.len());
+    let mut sums = Sums::NONE;
+    fitting.walk(blocks, |block, design| {
+        if !(block.nuisances.is_empty() && block.limits.is_empty()) {
+            return Err(FitError::Parts { what: "nuisances of a share", expected: 0, found: 1 });
+        }
+        let settled = fitting.known.settled(block, design, Some(&pass))?;
+        let common: Vec<&Common> = block.common.iter().filter(|c| c.shift.is_shared()).collect();
+        let sides = sensitivities(design, &settled, &common)?;
+        for (sample, variance) in block.samples.iter().zip(&settled.variances) {
+            sums.note(sample.value, *variance);
+        }
+        absorb(&mut triangle, design, &settled.rows(), &sides)
+    })?;
+    let common = shared.common.into_iter().map(|common| common.name).collect();
+    Ok(Partial::weighted(fitting.basis, asked.model.penalty, common, sums, triangle))
+}
