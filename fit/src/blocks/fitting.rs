@@ -1,6 +1,6 @@
 //! The fit itself: walk by walk until the weights agree with the field, and what is said at the end.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::doubting::doubted;
 use super::passing::{Known, Pass};
@@ -55,9 +55,19 @@ pub fn fit<B: Blocks>(
 
 pub(super) struct Fitting<'a> {
     pub(super) asked: Asked<'a>,
-    pub(super) basis: Basis,
-    prior: Prior,
+    pub(super) basis: Arc<Basis>,
+    pub(super) prior: Arc<Prior>,
     pub(super) known: Known,
+}
+
+/// What a triangle says.
+pub(super) struct Stated {
+    /// Without truncation, and without what residuals say of its quality.
+    pub(super) fit: Fit,
+    nuisances: Vec<FittedNuisance>,
+    solved: Solved,
+    whole: Vec<f64>,
+    condition: f64,
 }
 
 /// What all blocks share.
@@ -92,8 +102,8 @@ impl<'a> Fitting<'a> {
         if totals.limits == readings {
             return Err(FitError::OnlyLimits { readings });
         }
-        let basis = Basis::new(model.basis, region)?;
-        let prior = Prior::new(&basis, model.penalty)?;
+        let basis = Arc::new(Basis::new(model.basis, region)?);
+        let prior = Arc::new(Prior::new(&basis, model.penalty)?);
         Ok(Self { asked, basis, prior, known: Known::new(*totals) })
     }
 
@@ -190,16 +200,16 @@ impl<'a> Fitting<'a> {
         let (triangle, _) = self.settle(blocks, triangle, &shared)?;
         let solved = solved(triangle, (shared.nuisances.len(), 0), &self.prior)?;
         self.demand_rank(&solved)?;
-        Ok((self.basis, solved.field.unknowns(0)))
+        Ok((Arc::unwrap_or_clone(self.basis), solved.field.unknowns(0)))
     }
 
     fn next(&self, solved: &Solved, before: Option<&Pass>, passes: usize, robust: Robust) -> Pass {
-        let coefficients: Rc<[f64]> = solved.field.unknowns(0).into();
+        let coefficients: Arc<[f64]> = solved.field.unknowns(0).into();
         // The field of the second pass is near enough to the last one's: this is of second order.
-        let moved_by = before.filter(|_| passes >= 2).map(|pass| Rc::clone(&pass.moved_by));
+        let moved_by = before.filter(|_| passes >= 2).map(|pass| Arc::clone(&pass.moved_by));
         Pass {
-            columns_by: before.map(|pass| Rc::clone(&pass.coefficients)),
-            moved_by: moved_by.unwrap_or_else(|| Rc::clone(&coefficients)),
+            columns_by: before.map(|pass| Arc::clone(&pass.coefficients)),
+            moved_by: moved_by.unwrap_or_else(|| Arc::clone(&coefficients)),
             nuisances: solved.nuisances(&coefficients),
             determined: self.prior.determined_by(&solved.field),
             excess: 0.0,
@@ -247,7 +257,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// The same rows with what the components do to them.
-    fn with_sides<B: Blocks>(
+    pub(super) fn with_sides<B: Blocks>(
         &self,
         blocks: &mut B,
         pass: &Pass,
@@ -275,6 +285,24 @@ impl<'a> Fitting<'a> {
         if sides > 0 {
             triangle = self.with_sides(blocks, pass, (shared, sides))?;
         }
+        let Stated { fit, nuisances, solved, whole, condition } =
+            self.stated(triangle, pass, (shared, sides))?;
+        let widened = self.widened(blocks, &fit, pass, (shared, poses))?;
+        let closed = (pass, &solved, widened.as_ref());
+        let sums = self.tell(blocks, closed, (&fit, &whole), told)?;
+        let quality = sums.quality(condition, fit.determined(), pass.excess);
+        let parts = widened.map_or_else(|| fit.parts().clone(), |widened| widened.parts);
+        let fit = Fit::from_parts(Parts { quality, ..parts });
+        Ok((fit.map_err(|_| FitError::OutOfRange)?, nuisances))
+    }
+
+    /// What a triangle of all rows with their sides says, before anybody looks at single readings.
+    pub(super) fn stated(
+        &self,
+        triangle: Triangle,
+        pass: &Pass,
+        (shared, sides): (&Shared, usize),
+    ) -> Result<Stated, FitError> {
         let count = shared.nuisances.len();
         let solved = solved(triangle, (count, sides), &self.prior)?;
         self.demand_rank(&solved)?;
@@ -303,13 +331,7 @@ impl<'a> Fitting<'a> {
         };
         let whole = packed(&inverse, 1.0);
         let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
-        let widened = self.widened(blocks, &fit, pass, (shared, poses))?;
-        let closed = (pass, &solved, widened.as_ref());
-        let sums = self.tell(blocks, closed, (&fit, &whole), told)?;
-        let quality = sums.quality(condition, determined, pass.excess);
-        let parts = widened.map_or_else(|| fit.parts().clone(), |widened| widened.parts);
-        let fit = Fit::from_parts(Parts { quality, ..parts });
-        Ok((fit.map_err(|_| FitError::OutOfRange)?, nuisances))
+        Ok(Stated { fit, nuisances, solved, whole, condition })
     }
 
     /// The last walk: how good the fit is, and what each reading did.
@@ -370,12 +392,12 @@ impl Shared {
     }
 
     /// Those whose effect has to go through the factorisation.
-    fn shifting<'c>(&self, common: &'c [Common]) -> Vec<&'c Common> {
+    pub(super) fn shifting<'c>(&self, common: &'c [Common]) -> Vec<&'c Common> {
         common.iter().filter(|common| needs_a_side(common, self.holds_constant)).collect()
     }
 
     /// A block whose components are other ones is no block of these readings.
-    fn demand(&self, block: &Readings<'_>) -> Result<(), FitError> {
+    pub(super) fn demand(&self, block: &Readings<'_>) -> Result<(), FitError> {
         let shared = block.common.iter().filter(|common| common.shift.is_shared());
         demand_same("common components of a block", &self.common, shared)?;
         demand_same("nuisances of a block", &self.nuisances, block.nuisances.iter())
@@ -406,7 +428,7 @@ fn lasting(common: &Common) -> Common {
 }
 
 /// A block of limits alone is none that a fit refuses: there are others.
-fn check_block(block: &Readings<'_>) -> Result<(), FitError> {
+pub(super) fn check_block(block: &Readings<'_>) -> Result<(), FitError> {
     if let Some(wrong) = block.common.iter().find(|c| !(c.u.is_finite() && c.u >= 0.0)) {
         return Err(FitError::Common { name: wrong.name.clone() });
     }

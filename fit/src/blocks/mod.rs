@@ -57,6 +57,7 @@
 //! ```
 
 pub use fitting::fit;
+pub use live::Live;
 pub use sharing::share;
 
 use crate::{
@@ -66,6 +67,7 @@ use crate::{
 
 mod doubting;
 mod fitting;
+mod live;
 mod passing;
 mod sharing;
 mod sketch;

@@ -1,6 +1,6 @@
 //! What one walk leaves to the next, and what it makes of a block: the weights of its readings.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::beam::design::Design;
 use crate::solve::{levels, sensitivities};
@@ -19,11 +19,11 @@ pub(super) struct Known {
 /// What the weights follow from.
 #[derive(Debug, Clone)]
 pub(super) struct Pass {
-    pub(super) coefficients: Rc<[f64]>,
+    pub(super) coefficients: Arc<[f64]>,
     /// The field whose levels say what nuisances did to the readings: that of the pass before.
-    pub(super) columns_by: Option<Rc<[f64]>>,
+    pub(super) columns_by: Option<Arc<[f64]>>,
     /// The field by which rays off the meant ones matter.
-    pub(super) moved_by: Rc<[f64]>,
+    pub(super) moved_by: Arc<[f64]>,
     pub(super) nuisances: Vec<f64>,
     pub(super) determined: f64,
     pub(super) excess: f64,

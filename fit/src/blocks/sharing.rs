@@ -33,5 +33,5 @@ pub fn share<B: Blocks>(
         absorb(&mut triangle, design, &settled.rows(), &sides)
     })?;
     let common = shared.common.into_iter().map(|common| common.name).collect();
-    Ok(Partial::weighted(fitting.basis, asked.model.penalty, common, sums, triangle))
+    Ok(Partial::weighted((*fitting.basis).clone(), asked.model.penalty, common, sums, triangle))
 }

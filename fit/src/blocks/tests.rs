@@ -1,12 +1,13 @@
 //! Blocks against the fit of all readings in memory.
 
-use super::{Asked, Blocks, Blockwise, Totals, fit, share as share_in_blocks};
-use crate::partial::Partial;
+use super::{Asked, Blocks, Blockwise, Totals, fit};
 use crate::scattered::{BASIS, REGION, part, reading};
 use crate::{
     Angular, BasisSpec, Common, Fine, Fit, FitError, FittedNuisance, Limit, Noise, Penalised,
     Penalty, Position, Ray, Readings, Resolves, Robust, Sample, Shift, fit_readings,
 };
+
+mod once_tests;
 
 const READINGS: usize = 2500;
 
@@ -435,52 +436,4 @@ fn what_makes_no_sense_is_refused_as_in_memory() {
     assert!(error.to_string().contains("common components of a block"), "{error}");
     source.samples.clear();
     assert_eq!(refused(&mut source, BASIS.into()), FitError::Empty);
-}
-
-#[test]
-fn a_share_in_blocks_is_the_share_of_readings_that_are_there() {
-    // Uncertainties that explain the scatter, and some that do not; a component that each reading has its own
-    // share of.
-    for (u, tolerance) in [(0.5, 1e-11), (0.1, 1e-5)] {
-        let mut source = Source::new(|_, _| Noise::Fixed { variance: u * u }, false);
-        source.common = |from| {
-            let tilt = move |i: usize, level: f64| level * 1e-3 * ((from + i) % 7) as f64;
-            vec![
-                Common { name: "scale".to_owned(), u: 0.01, shift: Shift::Scale },
-                Common { name: "tilt".to_owned(), u: 1.0, shift: Shift::Value(Box::new(tilt)) },
-            ]
-        };
-        let (model, common) = (Penalised::from(BASIS), (source.common)(0));
-        let whole = Partial::of(&source.samples, &REGION, model, &common, None).unwrap();
-        let mut totals = Totals::default();
-        source
-            .each(&mut |block| {
-                totals.take(block);
-                Ok(())
-            })
-            .unwrap();
-        let asked = Asked {
-            region: REGION,
-            model,
-            robust: Robust::None,
-            optics: None,
-            with_truncation: false,
-            others: &[],
-        };
-        let share = share_in_blocks(&mut source, &totals, &asked).unwrap();
-        let (found, expected) = (share.parts(), whole.parts());
-        assert_eq!((found.common, found.sums.readings), (expected.common, expected.sums.readings));
-        let largest = expected.triangle.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
-        // By columns. What is left of components beyond functions and values has no direction of its own.
-        let columns = (0..).flat_map(|column| 0..=column);
-        let entries = columns.zip(found.triangle.iter().zip(&expected.triangle));
-        for (_, (a, b)) in entries.filter(|(row, _)| *row <= BASIS.len()) {
-            // The sign of a row is nobody's.
-            assert!((a.abs() - b.abs()).abs() <= tolerance * largest, "{a} {b}");
-        }
-        let [found, expected] = [share, whole].map(|share| share.fit(None).unwrap().exitance());
-        for (a, b) in [(found.value, expected.value), (found.u, expected.u)] {
-            assert!((a / b - 1.0).abs() < tolerance, "{a} {b}");
-        }
-    }
 }
