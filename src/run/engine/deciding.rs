@@ -9,7 +9,7 @@ use crate::run::rule::Said;
 
 impl Engine<'_> {
     pub(super) fn judge(&mut self) {
-        let judgement = self.check.as_mut().map(|check| (check.judge)(&self.checked));
+        let judgement = self.check.take().map(|mut check| (check.judge)(&self.checked));
         let go_on = match judgement {
             None => Ok(()),
             Some(judgement) => {
