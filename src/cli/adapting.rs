@@ -1,6 +1,8 @@
 //! Runs that decide on the way: the decision put together from the plan's terms, and what was found
 //! after each round, in words. How it is decided is [`crate::study::adaptive`]'s.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use super::acquire::Pace;
@@ -16,11 +18,11 @@ use crate::run::resume::rule_met;
 use crate::run::{Decide, Decided, Decider, Next};
 use crate::study::adaptive::{Account, Choice, Gaps, Terms, Verdict, conclude, decide};
 
-/// Decides for a run that has these readings from earlier sessions; the setup's sequence holds all
+/// Decides for a run whose journal may have readings from earlier sessions; the setup's sequence holds all
 /// steps so far, and its accounts what was decided. `None` if the plan is fixed beforehand.
 pub(crate) fn decider(
     setup: &Setup,
-    before: Vec<Reading>,
+    journal: &Path,
     pace: Pace,
 ) -> Result<Option<Decider>, Failure> {
     let Some(terms) = terms(setup)? else { return Ok(None) };
@@ -30,7 +32,7 @@ pub(crate) fn decider(
         accounts: setup.accounts.clone(),
         readings: Vec::new(),
     };
-    deciding.look(before);
+    deciding.look(Reader::open(journal)?.readings(Order::Taken)?);
     let decide: Decide = Box::new(move |readings| deciding.decide(readings));
     match pace {
         Pace::Virtual => Ok(Some(Decider::inline(decide))),

@@ -18,6 +18,7 @@ mod frontier;
 mod halt;
 mod hand;
 mod inputs;
+mod live;
 mod long_results;
 mod long_run;
 mod monte_carlo;
@@ -41,6 +42,8 @@ mod setup;
 mod shop;
 mod simulated;
 mod stopping;
+#[cfg(test)]
+mod stopping_tests;
 pub mod stopwatch;
 mod stream;
 mod study;

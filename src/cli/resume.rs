@@ -10,7 +10,7 @@ use super::args::ResumeArgs;
 use super::failure::{Failure, Outcome};
 use super::folder::{JOURNAL, effects};
 use super::output::note;
-use super::run::{Ending, finish, job_after};
+use super::run::{Ending, finish, job_of};
 use super::setup::Setup;
 use crate::journal::{Journal, Order, Reader};
 use crate::run::resume::{Remainder, check, remainder};
@@ -95,9 +95,9 @@ pub(crate) fn job(
     if (left.steps.is_empty() && !is_open) || left.rule.is_some() {
         return Ok(None);
     }
+    let mut job = job_of(setup, journal, on_fault, pace)?;
     let before = Reader::open(journal)?.readings(Order::Taken)?;
     let rig = Arc::new(setup.rig.clone());
-    let mut job = job_after(setup, before.clone(), on_fault, pace)?;
     job.check = Some(check(rig, &setup.sequence, left, before, accepts_drift));
     job.warm_up = job.warm_up.map(|(gate, step, _)| (gate, step, left.warm_ups));
     job.steps.clone_from(&left.steps);

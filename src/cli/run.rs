@@ -7,7 +7,7 @@ use super::acquire::{Acquired, Company, Pace, acquire, exit_code};
 use super::adapting;
 use super::args::RunArgs;
 use super::failure::{Failure, Outcome};
-use super::folder::{create, default_folder, exists_already};
+use super::folder::{JOURNAL, create, default_folder, exists_already};
 use super::outlook::refusal;
 use super::output::{note, say, say_json};
 use super::report::RunRecord;
@@ -17,7 +17,6 @@ use super::stopping;
 use super::summary::Summary;
 use super::text::shell_word;
 use crate::plan::{DarkMethod, Plan};
-use crate::rig::Reading;
 use crate::run::{self, Job, OnFault};
 
 /// How the person wants the end of it.
@@ -43,29 +42,24 @@ pub(crate) fn run(args: &RunArgs) -> Outcome {
     let pace = Pace::of(&setup, args.realtime);
     let acquired = acquire(&setup, pace, Company::Alone, || {
         let (journal, _) = create(&folder, &setup)?;
-        Ok((journal, first_job(&setup, OnFault::Finish, pace)?))
+        Ok((journal, job_of(&setup, &folder.join(JOURNAL), OnFault::Finish, pace)?))
     })?;
     let ending = Ending { is_strict: args.strict, is_json: args.json, in_blocks: args.in_blocks };
     finish(&folder, &setup, acquired, began, ending)
 }
 
-/// A run from its beginning.
-pub(crate) fn first_job(setup: &Setup, on_fault: OnFault, pace: Pace) -> Result<Job, Failure> {
-    job_after(setup, Vec::new(), on_fault, pace)
-}
-
-/// The whole run, for somebody who has these readings of it.
-pub(crate) fn job_after(
+/// The whole run, whose journal may have readings already.
+pub(crate) fn job_of(
     setup: &Setup,
-    before: Vec<Reading>,
+    journal: &Path,
     on_fault: OnFault,
     pace: Pace,
 ) -> Result<Job, Failure> {
     let mut job = Job::new(setup.sequence.steps.clone(), on_fault);
     job.warm_up = setup.plan.warm_up.map(|gate| (gate, setup.sequence.warm_up(0), 0));
     job.rig_time_max = setup.plan.stop.rig_time_max;
-    job.rule = stopping::rule(setup, before.clone(), pace)?;
-    job.decider = adapting::decider(setup, before, pace)?;
+    job.rule = stopping::rule(setup, journal, pace)?;
+    job.decider = adapting::decider(setup, journal, pace)?;
     Ok(job)
 }
 

@@ -13,7 +13,7 @@ use super::inputs::Bundle;
 use super::report::RunRecord;
 use super::results::{Results, open_run, targets_planned};
 use super::resume::{self, what_is_left};
-use super::run::first_job;
+use super::run::job_of;
 use super::session::utc_now;
 use super::setup::{Setup, Stage};
 use super::stopping;
@@ -177,7 +177,7 @@ impl Workshop for Shop {
                 // A daemon that was killed while it made the folder had measured nothing.
                 let _ = std::fs::remove_dir_all(folder);
                 let (journal, _) = create(folder, &setup).map_err(refuse)?;
-                (journal, first_job(&setup, OnFault::Wait, Pace::Real).map_err(refuse)?)
+                (journal, job_of(&setup, &path, OnFault::Wait, Pace::Real).map_err(refuse)?)
             }
             Err(error) => return Err(Refusal::new(error.to_string())),
             Ok(journal) => {

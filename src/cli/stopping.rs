@@ -1,14 +1,24 @@
 //! The exitance's uncertainty so far, and the plan's target for it, `exitance_relative` of its
 //! `[stop]`: the rule that ends a run once it is met, what is said while the run goes on, and of a run
 //! that missed it.
+//!
+//! A run's first readings are kept and fitted anew at every look. From [`KEPT_MAX`] of them on none is: each is
+//! taken in once ([`LiveFit`]), so that a look costs what it costs however many there were. What the functions
+//! can't follow then takes a walk through the journal, which has the last word on whether it is enough.
+
+use std::path::{Path, PathBuf};
 
 use fit::{Choice, Chosen, Fit, Ruled};
 
 use super::acquire::Pace;
 use super::failure::Failure;
+use super::live::LiveFit;
+use super::long_results::readings_taken;
+use super::long_run::LongRun;
 use super::results::{Results, fit_region, optics, targets_planned};
 use super::setup::Setup;
 use super::text::{duration, percent};
+use crate::journal::Reader;
 use crate::rig::calibration::{Calibrated, Fitted, calibrate};
 use crate::rig::{Reading, ReadingKind, Rig};
 use crate::run::{Rule, Said, Watch};
@@ -21,19 +31,20 @@ const COEFFICIENTS_CHOSEN: usize = 30;
 /// The fit is made anew whenever there are this much more targets: all fits together cost about
 /// eleven times the last one.
 const GROWTH: f64 = 1.1;
+/// Readings that are kept to be fitted anew: some 10 MB with all that is made of them.
+const KEPT_MAX: usize = 20_000;
 
-/// The rule for a run that has these readings from earlier sessions. In virtual time, where nobody
+/// The rule for a run, whose journal may have readings from earlier sessions. In virtual time, where nobody
 /// watches and every fit would be waited for, there is none where the plan has no target.
-pub(crate) fn rule(
-    setup: &Setup,
-    before: Vec<Reading>,
-    pace: Pace,
-) -> Result<Option<Watch>, Failure> {
+pub(crate) fn rule(setup: &Setup, journal: &Path, pace: Pace) -> Result<Option<Watch>, Failure> {
     let asked = setup.plan.stop.exitance_relative;
     if asked.is_none() && pace == Pace::Virtual {
         return Ok(None);
     }
-    let mut target = Target::new(setup, asked, before);
+    let mut target = Target::new(setup, journal, KEPT_MAX);
+    for reading in readings_taken(&Reader::open(journal)?) {
+        target.take(&reading.map_err(Failure::start)?);
+    }
     let rule: Rule = Box::new(move |reading| target.look(reading));
     match pace {
         Pace::Virtual => Ok(Some(Watch::inline(rule))),
@@ -44,7 +55,7 @@ pub(crate) fn rule(
 }
 
 /// The exitance's combined uncertainty, as far as it is known.
-struct Target {
+pub(super) struct Target {
     rig: Rig,
     region: fit::Region,
     wish: fit::Wish,
@@ -54,13 +65,23 @@ struct Target {
     /// The plan's target, if it has one.
     asked: Option<f64>,
     planned: usize,
-    readings: Vec<Reading>,
+    journal: PathBuf,
+    kept_max: usize,
+    pub(super) form: Form,
     targets: usize,
     next: usize,
 }
 
+/// Where the readings so far are.
+pub(super) enum Form {
+    Kept(Vec<Reading>),
+    Live(Box<LiveFit>),
+    /// In the journal alone: of these nothing can be taken in once. A look walks through all of them.
+    Journalled,
+}
+
 impl Target {
-    fn new(setup: &Setup, asked: Option<f64>, before: Vec<Reading>) -> Self {
+    pub(super) fn new(setup: &Setup, journal: &Path, kept_max: usize) -> Self {
         let wish = setup.plan.fit;
         let coefficients = wish.decided().map_or(COEFFICIENTS_CHOSEN, |model| model.basis.len());
         let first = coefficients.saturating_mul(SAMPLES_PER_COEFFICIENT);
@@ -70,18 +91,19 @@ impl Target {
             wish,
             chosen: wish.decided().map(|model| (model.into(), usize::MAX)),
             optics: optics(setup),
-            asked,
+            asked: setup.plan.stop.exitance_relative,
             planned: targets_planned(setup),
-            targets: before.iter().filter(|reading| is_target(reading)).count(),
-            readings: before,
+            journal: journal.to_owned(),
+            kept_max,
+            form: Form::Kept(Vec::new()),
+            targets: 0,
             next: first,
         }
     }
 
     /// What the rule says when this reading is taken.
     fn look(&mut self, reading: &Reading) -> Said {
-        self.readings.push(reading.clone());
-        self.targets += usize::from(is_target(reading));
+        self.take(reading);
         if !is_target(reading) || self.targets < self.next {
             return Said::Nothing;
         }
@@ -89,15 +111,44 @@ impl Target {
         self.so_far(reading.time_s).unwrap_or(Said::Nothing)
     }
 
-    fn so_far(&mut self, rig_s: f64) -> Option<Said> {
-        let calibrated = calibrate(&self.rig, &self.readings).ok()?;
-        let mut trend = Trend::of_exitance(rig_s, &self.fitted(&calibrated)?)?;
-        let Self { asked, targets, planned, .. } = *self;
-        // What the functions can't follow, and what others make of where nothing was measured, takes a
-        // pass more: it has the last word.
-        if asked.is_some_and(|asked| trend.u() <= asked) {
-            trend = Trend::of_exitance(rig_s, &self.doubted(&calibrated)?)?;
+    /// Takes a reading without saying anything.
+    pub(super) fn take(&mut self, reading: &Reading) {
+        self.targets += usize::from(is_target(reading));
+        match &mut self.form {
+            Form::Kept(readings) => {
+                readings.push(reading.clone());
+                if readings.len() >= self.kept_max {
+                    self.form = self.without_readings();
+                }
+            }
+            Form::Live(live) => {
+                if live.take(&self.rig, reading).is_err() {
+                    self.form = Form::Journalled;
+                }
+            }
+            Form::Journalled => {}
         }
+    }
+
+    /// Lets go of the readings that were kept.
+    fn without_readings(&mut self) -> Form {
+        let Form::Kept(readings) = std::mem::replace(&mut self.form, Form::Journalled) else {
+            return Form::Journalled;
+        };
+        if self.chosen.is_none()
+            && let Ok(calibrated) = calibrate(&self.rig, &readings)
+        {
+            self.fitted(&calibrated);
+        }
+        let Some((chosen, _)) = &self.chosen else { return Form::Journalled };
+        let asked = (&self.region, chosen.model, self.optics.as_ref());
+        let live = LiveFit::begin(&self.rig, &readings, asked, &self.wish.rules);
+        live.map_or(Form::Journalled, |live| Form::Live(Box::new(live)))
+    }
+
+    fn so_far(&mut self, rig_s: f64) -> Option<Said> {
+        let trend = self.trend(rig_s)?;
+        let Self { asked, targets, planned, .. } = *self;
         Some(match asked {
             Some(asked) if trend.u() <= asked => Said::Enough(format!(
                 "exitance to {} after {targets} of {planned} targets",
@@ -105,6 +156,43 @@ impl Target {
             )),
             _ => Said::SoFar(said_so_far(&trend, asked)),
         })
+    }
+}
+
+impl Target {
+    /// What the functions can't follow, and what others make of where nothing was measured, takes a pass more:
+    /// where the rest would be enough, it has the last word.
+    pub(super) fn trend(&mut self, rig_s: f64) -> Option<Trend> {
+        let asked = self.asked;
+        let is_enough = |trend: &Trend| asked.is_some_and(|asked| trend.u() <= asked);
+        if let Form::Kept(readings) = &self.form {
+            let calibrated = calibrate(&self.rig, readings).ok()?;
+            let trend = Trend::of_exitance(rig_s, &self.fitted(&calibrated)?)?;
+            if is_enough(&trend) {
+                return Trend::of_exitance(rig_s, &self.doubted(&calibrated)?);
+            }
+            return Some(trend);
+        }
+        if let Form::Live(live) = &mut self.form {
+            match live.fit(&self.rig) {
+                Ok(fit) => {
+                    let trend = Trend::of_exitance(rig_s, &fit?)?;
+                    if !is_enough(&trend) {
+                        return Some(trend);
+                    }
+                }
+                Err(_) => self.form = Form::Journalled,
+            }
+        }
+        Trend::of_exitance(rig_s, &self.walked()?)
+    }
+
+    /// The fit of all that is in the journal by now, with all that is not known of it.
+    fn walked(&self) -> Option<Fit> {
+        let reader = Reader::open(&self.journal).ok()?;
+        let run = LongRun::open(&self.rig, &reader, &self.wish.rules).ok()?;
+        let made = run.fit_wished(&self.region, self.optics.as_ref(), &self.wish);
+        Some(made.ok()?.ruled.fit)
     }
 }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use super::acquire::{Acquired, Company, Pace, acquire};
 use super::failure::Failure;
-use super::folder::create_within;
-use super::run::{first_job, why_not_whole};
+use super::folder::{JOURNAL, create_within};
+use super::run::{job_of, why_not_whole};
 use super::setup::Setup;
 use crate::journal::{EffectWishes, Input, InputRole, Order};
 use crate::rig::Reading;
@@ -59,7 +59,7 @@ impl VirtualRun {
     pub(crate) fn kept(setup: Setup, folder: &Path) -> Result<Self, Failure> {
         let acquired = acquire(&setup, Pace::Virtual, Company::AmongOthers, || {
             let (journal, _) = create_within(folder, &setup)?;
-            Ok((journal, first_job(&setup, OnFault::Finish, Pace::Virtual)?))
+            Ok((journal, job_of(&setup, &folder.join(JOURNAL), OnFault::Finish, Pace::Virtual)?))
         })?;
         let Acquired { outcome, rig_s, journal } = acquired;
         let journal = journal.map_err(Failure::midway)?;
