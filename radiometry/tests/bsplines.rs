@@ -281,6 +281,19 @@ fn the_seam_of_a_circle_is_smooth() {
 }
 
 #[test]
+fn knots_may_lie_as_close_as_doubles_do() {
+    let tiny = f64::MIN_POSITIVE / 1024.0;
+    for breaks in [vec![0.0, tiny, 3.0 * tiny], vec![0.0, 1e-300, 1e-300 + tiny, 1.0]] {
+        let spline = BSpline::open(3, &breaks).unwrap();
+        for x in breaks {
+            let active = spline.nonzero(x).unwrap();
+            let sum: f64 = active.values().iter().sum();
+            assert!((sum - 1.0).abs() < 4e-15, "{x:e}: {active:?}");
+        }
+    }
+}
+
+#[test]
 fn unclamped_knots_are_a_partition_of_unity_on_their_domain() {
     let knots: Vec<f64> = (0..10).map(f64::from).collect();
     let spline = BSpline::with_knots(3, &knots).unwrap();

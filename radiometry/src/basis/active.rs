@@ -25,7 +25,9 @@ impl Active {
 
     /// Place among all functions, and value.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> {
-        let index = move |i: usize| (self.first + i) % self.len;
+        // Fewer than two turns: there are no fewer functions than `count`.
+        let turned = |place: usize| if place < self.len { place } else { place - self.len };
+        let index = move |i: usize| turned(turned(self.first) + i);
         self.values().iter().enumerate().map(move |(i, value)| (index(i), *value))
     }
 
@@ -39,15 +41,16 @@ impl Active {
         &self.values[..self.count]
     }
 
+    /// These values.
+    #[inline]
+    pub(super) fn take<const N: usize>(&mut self, values: [f64; N]) {
+        self.values[..N].copy_from_slice(&values);
+    }
+
     /// Values by the recurrence up to a degree, derivatives from there to the full degree.
     /// `knots`: from the start of the first function's support on.
-    #[inline]
     pub(super) fn raise(&mut self, knots: &[f64], x: f64, to: usize) -> Result<(), DomainError> {
-        // Nearly all are values of cubic ones: loops whose lengths the compiler knows.
-        match (self.count - 1, to) {
-            (3, 3) => raise(&mut self.values, &knots[..8], x, 3, 3),
-            (degree, to) => raise(&mut self.values, knots, x, degree, to),
-        }
+        raise(&mut self.values, knots, x, self.count - 1, to);
         if self.values().iter().all(|value| value.is_finite()) {
             Ok(())
         } else {
@@ -57,8 +60,6 @@ impl Active {
 }
 
 /// The recurrences of [`Active::raise`].
-#[expect(clippy::inline_always, reason = "its loops' lengths are known where it is inlined")]
-#[inline(always)]
 fn raise(values: &mut [f64; DEGREE_MAX + 1], knots: &[f64], x: f64, degree: usize, to: usize) {
     values[0] = 1.0;
     // x lies between the knots at places `degree` and `degree + 1`.
@@ -67,9 +68,10 @@ fn raise(values: &mut [f64; DEGREE_MAX + 1], knots: &[f64], x: f64, degree: usiz
         for i in 0..=reached {
             let right = knots[degree + 1 + i] - x;
             let left = x - knots[degree + i - reached];
-            let share = values[i] / (right + left);
-            values[i] = from_left + right * share;
-            from_left = left * share;
+            // In this order, lest a width near the smallest double make a share infinite.
+            let (value, width) = (values[i], right + left);
+            values[i] = from_left + value * (right / width);
+            from_left = value * (left / width);
         }
         values[reached + 1] = from_left;
     }

@@ -8,10 +8,12 @@
 //!
 //! Values by the recurrence of Cox (1972) and de Boor (1972, "On calculating with B-splines"; BSPLVB
 //! in "A Practical Guide to Splines", 1978, chapter X), which adds non-negative terms only: within
-//! some `degree` roundings of the true value, whatever the knots. Derivatives by differences of
+//! some `degree` roundings of the true value, whatever the knots; of cubic ones from their Bézier
+//! ordinates, which that recurrence finds (`pieces`). Derivatives by differences of
 //! the functions of lower degree (ibid., eq. X.15).
 
 use super::active::{Active, DEGREE_MAX};
+use super::pieces::Pieces;
 use crate::domain::{DomainError, finite, within};
 use crate::quadrature::gauss_legendre;
 
@@ -29,6 +31,7 @@ pub struct BSpline {
     knots: Vec<f64>,
     len: usize,
     is_periodic: bool,
+    pieces: Pieces,
 }
 
 impl BSpline {
@@ -41,7 +44,7 @@ impl BSpline {
         let degree = checked_degree(degree)?;
         expect_count("knots", knots.len(), 2 * degree + 2)?;
         let len = knots.len() - degree - 1;
-        Self { degree, knots: checked_knots(knots)?, len, is_periodic: false }.checked()
+        Self::checked(degree, checked_knots(knots)?, len, false)
     }
 
     /// Between two ends, clamped: the breaks from one end to the other, the ends once. The first and
@@ -63,7 +66,8 @@ impl BSpline {
         let mut knots = vec![first; degree];
         knots.extend(&breaks);
         knots.extend(std::iter::repeat_n(last, degree));
-        Self { degree, len: knots.len() - degree - 1, knots, is_periodic: false }.checked()
+        let len = knots.len() - degree - 1;
+        Self::checked(degree, knots, len, false)
     }
 
     /// Round a circle: the breaks over one turn, the last being the first again, a period on. Any
@@ -88,7 +92,7 @@ impl BSpline {
         let before = breaks[len - degree..len].iter().map(|knot| first - (last - knot));
         let after = breaks[1..=degree].iter().map(|knot| last + (knot - first));
         let knots: Vec<f64> = before.chain(breaks.iter().copied()).chain(after).collect();
-        Self { degree, knots: checked_knots(&knots)?, len, is_periodic: true }.checked()
+        Self::checked(degree, checked_knots(&knots)?, len, true)
     }
 
     /// The degree p of the pieces.
@@ -135,9 +139,14 @@ impl BSpline {
     #[inline]
     pub fn nonzero_derivatives(&self, x: f64, order: usize) -> Result<Active, DomainError> {
         let x = self.reduced(x)?;
-        let span = self.span(x);
-        let mut active = Active::new(span - self.degree, self.degree, self.len);
-        if order <= self.degree {
+        let span = self.pieces.span(&self.knots, self.degree, x);
+        let first = span - self.degree;
+        let mut active = Active::new(first, self.degree, self.len);
+        if order == 0
+            && let Some(values) = self.pieces.values(first, x)
+        {
+            active.take(values);
+        } else if order <= self.degree {
             active.raise(&self.knots[span - self.degree..], x, self.degree - order)?;
         }
         Ok(active)
@@ -245,33 +254,28 @@ impl BSpline {
         Ok((from + turned.max(0.0)).min(to))
     }
 
-    /// The last place i with tᵢ <= x < tᵢ₊₁; at the domain's end, of its last span.
-    fn span(&self, x: f64) -> usize {
-        let inner = &self.knots[self.degree..=self.end()];
-        let end = inner[inner.len() - 1];
-        let past = if x < end {
-            inner.partition_point(|knot| *knot <= x)
-        } else {
-            inner.partition_point(|knot| *knot < end)
-        };
-        self.degree + past - 1
-    }
-
     /// No knot stands too often, and there is a domain.
-    fn checked(self) -> Result<Self, DomainError> {
-        let most = self.degree + 1;
-        for run in self.knots.chunk_by(|a, b| a >= b) {
+    fn checked(
+        degree: usize,
+        knots: Vec<f64>,
+        len: usize,
+        is_periodic: bool,
+    ) -> Result<Self, DomainError> {
+        let most = degree + 1;
+        for run in knots.chunk_by(|a, b| a >= b) {
             if run.len() > most {
                 return Err(DomainError::Repeated { knot: run[0], times: run.len(), most });
             }
         }
         // Lest a difference of knots be infinite.
-        finite("the knots' extent", self.knots[self.knots.len() - 1] - self.knots[0])?;
-        let (from, to) = self.domain();
-        if from < to {
-            Ok(self)
+        finite("the knots' extent", knots[knots.len() - 1] - knots[0])?;
+        let end = knots.len() - 1 - degree;
+        let extent = knots[end] - knots[degree];
+        if extent > 0.0 {
+            let pieces = Pieces::new(&knots, degree, end);
+            Ok(Self { degree, knots, len, is_periodic, pieces })
         } else {
-            Err(DomainError::NotPositive { argument: "the domain's extent", value: to - from })
+            Err(DomainError::NotPositive { argument: "the domain's extent", value: extent })
         }
     }
 }

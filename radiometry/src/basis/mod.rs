@@ -7,6 +7,7 @@ pub mod bspline;
 pub mod harmonics;
 mod jacobi;
 pub mod legendre;
+mod pieces;
 pub mod zernike;
 
 pub use active::{Active, DEGREE_MAX};
