@@ -57,8 +57,14 @@ impl Fit {
             for &(u, v) in &directions {
                 let place = Place { u, v, a, b };
                 let ray = place.ray(self.region());
-                basis.direction_of(&ray, &mut scratch, &mut z);
-                keep(&mut starts, place, dot(&folded, &z));
+                let value = match basis.directions().local() {
+                    Some(splines) => splines.value(&folded, ray.theta_rad, ray.phi_rad),
+                    None => {
+                        basis.direction_of(&ray, &mut scratch, &mut z);
+                        dot(&folded, &z)
+                    }
+                };
+                keep(&mut starts, place, value);
             }
         }
         starts.into_iter().map(|(place, _)| place).collect()

@@ -88,8 +88,13 @@ impl Prior {
         if penalty.is_none() || basis.len() == 1 {
             return Ok(Self { rows: None });
         }
-        let rows = Roughness::new(basis, penalty.power)?.rows(penalty.strength.sqrt());
-        Ok(Self { rows: Some(rows) })
+        Ok(Self::of(Some(&Roughness::new(basis, penalty.power)?), penalty.strength))
+    }
+
+    /// Of a roughness that is known; of none nothing.
+    pub(crate) fn of(roughness: Option<&Roughness>, strength: f64) -> Self {
+        let held = roughness.filter(|_| strength > 0.0);
+        Self { rows: held.map(|roughness| roughness.rows(strength.sqrt())) }
     }
 
     pub(crate) fn is_none(&self) -> bool {

@@ -177,6 +177,9 @@ impl Placed {
     }
 }
 
+/// The functions of θ or of φ that are not zero at a place.
+type Few = Active<{ DEGREE + 1 }>;
+
 /// A value or a derivative: of this order in θ, and in φ.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Derivative {
@@ -240,6 +243,13 @@ impl PolarSplines {
         self.each_along(d, |k, value| out[k] += value);
     }
 
+    /// The value with these coefficients in a direction given by its angles.
+    pub(crate) fn value(&self, coefficients: &[f64], theta_rad: f64, phi_rad: f64) -> f64 {
+        let mut sum = 0.0;
+        self.each_towards(theta_rad, phi_rad, |k, value| sum += coefficients[k] * value);
+        sum
+    }
+
     /// Hands on every function that may not be zero in a direction, some in two parts; below the
     /// horizon those at it.
     pub(crate) fn each_along(&self, d: DVec3, hand: impl FnMut(usize, f64)) {
@@ -264,9 +274,11 @@ impl PolarSplines {
         mut hand: impl FnMut(usize, f64),
     ) -> Result<(), DomainError> {
         let theta_rad = theta_rad.clamp(0.0, FRAC_PI_2);
-        let across = self.theta.nonzero_derivatives(theta_rad, order.theta)?;
+        // Within the turn that the bands' breaks are counted in.
+        let phi_rad = if phi_rad < 0.0 { phi_rad + TAU } else { phi_rad };
+        let across: Few = self.theta.active(theta_rad, order.theta)?;
         // Towards the horizon neighbouring bands often have the same functions round φ.
-        let mut last: Option<(Band, Active)> = None;
+        let mut last: Option<(Band, Few)> = None;
         for (i, along) in across.iter() {
             // The first band's function of θ is the first spline and the second.
             if i == 1 && order.phi == 0 {
@@ -276,7 +288,7 @@ impl PolarSplines {
             match (&placed.round, placed.band) {
                 (Some(round), band) => {
                     if last.as_ref().is_none_or(|(before, _)| *before != band) {
-                        last = Some((band, round.nonzero_derivatives(phi_rad, order.phi)?));
+                        last = Some((band, round.active(phi_rad, order.phi)?));
                     }
                     let Some((_, around)) = &last else { continue };
                     around.iter().for_each(|(j, value)| hand(placed.at + j, along * value));

@@ -30,6 +30,11 @@ pub(crate) struct Ring {
     pub(crate) lens: Lens,
     pub(crate) area: f64,
     pub(crate) places: Vec<Place>,
+    /// How far from the axis the places lie at most.
+    pub(crate) reach_m: f64,
+    /// Means over the places of the powers of what lies along the shift and across it, in reaches: by
+    /// rising degree, and in each by rising power of what lies across.
+    pub(crate) powers: Vec<f64>,
 }
 
 /// A direction.
@@ -92,10 +97,30 @@ impl Directions {
                 let weight = weight / spokes as f64;
                 nodes.push(Node { slope: (slope * cos, slope * sin), cos, sin, weight, ring: at });
             }
-            let lens = lens(beam, slope);
-            rings.push(Ring { lens, area: lens.area(), places: lens.rule(position_degree) });
+            rings.push(Ring::new(lens(beam, slope), position_degree));
         }
         Self { degree, rings, nodes }
+    }
+}
+
+impl Ring {
+    fn new(lens: Lens, position_degree: usize) -> Self {
+        let places = lens.rule(position_degree);
+        let reach_m = places.iter().map(|p| libm::hypot(p.along, p.across)).fold(0.0, f64::max);
+        let in_reaches = |length_m: f64| if reach_m > 0.0 { length_m / reach_m } else { 0.0 };
+        let mut powers = Vec::new();
+        for total in 0..=position_degree {
+            for of_across in 0..=total {
+                let power = |length_m: f64, order: usize| {
+                    (0..order).fold(1.0, |p, _| p * in_reaches(length_m))
+                };
+                let term = |p: &Place| {
+                    p.weight * power(p.along, total - of_across) * power(p.across, of_across)
+                };
+                powers.push(places.iter().map(term).sum());
+            }
+        }
+        Self { lens, area: lens.area(), places, reach_m, powers }
     }
 }
 

@@ -320,6 +320,11 @@ impl Means {
             mean.iter_mut().zip(row).for_each(|(mean, value)| *mean += weight * *value);
             return;
         }
+        // The constant needs no place.
+        if let [mean] = &mut self.position[..] {
+            *mean += weight;
+            return;
+        }
         basis.position_continued(x_m, y_m, &mut self.place);
         for (mean, term) in self.position.iter_mut().zip(self.place.position()) {
             *mean += weight * term;

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use super::directions::Directions;
 use super::sight::Sight;
 use super::{Averager, Means};
-use crate::basis::Basis;
+use crate::basis::{Basis, dot};
 use crate::{Chart, Ray};
 
 /// Moments found so far, of beams of a rule and a direction.
@@ -75,25 +75,26 @@ impl Averager {
         let scale = (scale(region.x_m), scale(region.y_m));
         let sight = Sight::new(&Ray { x_m: 0.0, y_m: 0.0, ..*ray }, Chart::Surface);
         let mut means = vec![0.0; basis.len()];
-        let mut powers = (vec![1.0; degree + 1], vec![1.0; degree + 1]);
+        let mut powers = Powers::new(degree);
         let mut reach = (0.0_f64, 0.0_f64);
         for node in &rule.nodes {
             let Some(direction) = sight.direction(node.slope) else { continue };
             let shear = sight.shear(&self.optics.beam, node);
-            scratch.clear();
-            for place in &rule.rings[node.ring].places {
-                let s1 = place.along * node.cos - place.across * node.sin;
-                let s2 = place.along * node.sin + place.across * node.cos;
+            let ring = &rule.rings[node.ring];
+            // In half widths, of so many reaches along the shift and across it.
+            let place = |(along, across): (f64, f64)| {
+                let (along, across) = (along * ring.reach_m, across * ring.reach_m);
+                let s1 = along * node.cos - across * node.sin;
+                let s2 = along * node.sin + across * node.cos;
                 let (x, y) = sight.place(shear.place((s1, s2)));
-                let (x, y) = (x * scale.0, y * scale.1);
-                reach = (reach.0.max(x.abs()), reach.1.max(y.abs()));
-                powers.0[0] = place.weight;
-                for k in 0..degree {
-                    powers.0[k + 1] = powers.0[k] * x;
-                    powers.1[k + 1] = powers.1[k] * y;
-                }
-                add_powers(&powers.0, &powers.1, &mut scratch.position);
-            }
+                (x * scale.0, y * scale.1)
+            };
+            let (at, along, across) = (place((0.0, 0.0)), place((1.0, 0.0)), place((0.0, 1.0)));
+            let x = [at.0, along.0 - at.0, across.0 - at.0];
+            let y = [at.1, along.1 - at.1, across.1 - at.1];
+            let farthest = |[at, along, across]: [f64; 3]| at.abs() + libm::hypot(along, across);
+            reach = (reach.0.max(farthest(x)), reach.1.max(farthest(y)));
+            powers.means(x, y, &ring.powers, &mut scratch.position);
             scratch.direction_along(direction, basis);
             scratch.add(node.weight, &mut means);
         }
@@ -101,15 +102,55 @@ impl Averager {
     }
 }
 
-/// Adds the products of powers of two numbers, in the order of the position terms.
-fn add_powers(of_x: &[f64], of_y: &[f64], sums: &mut [f64]) {
-    let mut rest = sums;
-    for total in 0..of_x.len() {
-        let (own, others) = rest.split_at_mut(total + 1);
-        let products = of_x[..=total].iter().rev().zip(&of_y[..=total]);
-        own.iter_mut().zip(products).for_each(|(sum, (x, y))| *sum += x * y);
-        rest = others;
+/// Powers of two lengths that are linear in two others, as polynomials of these: coefficients by
+/// rising degree, and in each by rising power of the second.
+struct Powers {
+    degree: usize,
+    /// xᵃ yᵇ, by rising a + b and then b.
+    polynomials: Vec<Vec<f64>>,
+}
+
+impl Powers {
+    fn new(degree: usize) -> Self {
+        let count = term(degree, degree) + 1;
+        let mut polynomials = vec![vec![0.0; count]; count];
+        polynomials[0][0] = 1.0;
+        Self { degree, polynomials }
     }
+
+    /// The means of all xᵃ yᵇ from those of the others' powers; x and y by what they are where the
+    /// others are zero, and how they grow with the first and the second.
+    fn means(&mut self, x: [f64; 3], y: [f64; 3], of_others: &[f64], means: &mut [f64]) {
+        for total in 0..self.degree {
+            for of_y in 0..=total {
+                self.multiply(term(total, of_y), x, term(total + 1, of_y), total);
+            }
+            self.multiply(term(total, total), y, term(total + 1, total + 1), total);
+        }
+        for (mean, polynomial) in means.iter_mut().zip(&self.polynomials) {
+            *mean = dot(polynomial, of_others);
+        }
+    }
+
+    /// Makes one polynomial another one, of a degree, times a linear one.
+    fn multiply(&mut self, from: usize, by: [f64; 3], to: usize, degree: usize) {
+        let (before, after) = self.polynomials.split_at_mut(to);
+        let (from, to) = (&before[from], &mut after[0]);
+        to[..=term(degree + 1, degree + 1)].fill(0.0);
+        for total in 0..=degree {
+            for of_second in 0..=total {
+                let value = from[term(total, of_second)];
+                to[term(total, of_second)] += by[0] * value;
+                to[term(total + 1, of_second)] += by[1] * value;
+                to[term(total + 1, of_second + 1)] += by[2] * value;
+            }
+        }
+    }
+}
+
+/// The place of a product of powers of this degree in all, the second's being this one.
+const fn term(total: usize, of_second: usize) -> usize {
+    total * (total + 1) / 2 + of_second
 }
 
 /// The Taylor coefficients at `t` of the Legendre polynomials up to a degree, each scaled by √(2k+1):
@@ -150,10 +191,7 @@ fn add_up(x: &[Vec<f64>], y: &[Vec<f64>], means: &[f64], out: &mut [f64]) {
     let degree = x.len() - 1;
     let angular = out.len() / ((degree + 1) * (degree + 2) / 2);
     // Of the term (or the power) a in x and b in y.
-    let place = |a: usize, b: usize| {
-        let total = a + b;
-        angular * (total * (total + 1) / 2 + b)
-    };
+    let place = |a: usize, b: usize| angular * term(a + b, b);
     out.fill(0.0);
     let mut along_y = vec![0.0; angular];
     for (b, of_y) in y.iter().enumerate() {

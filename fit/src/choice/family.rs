@@ -15,6 +15,7 @@ use crate::triangle::{Solution, Triangle};
 use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Mat, Par, Side};
+use std::borrow::Cow;
 
 /// Whitened rows and values of the readings that a choice is made from.
 pub(super) struct Family {
@@ -37,6 +38,13 @@ pub(super) struct Trial {
     pub(super) left_out: f64,
     /// Mean square of the residuals beyond the stated noise, in the value's unit squared.
     pub(super) misfit: f64,
+}
+
+/// A penalty, with what it holds against a field, and the variance of the readings over their stated one.
+struct Held {
+    penalty: Penalty,
+    scale: f64,
+    roughness: Option<Roughness>,
 }
 
 /// What is to be tried of penalties.
@@ -84,12 +92,13 @@ impl Family {
         let basis = Basis::new(spec, self.region)?;
         let rows = self.columns(spec);
         let solution = triangle(&rows, &self.values).ok_or(FitError::OutOfRange)?;
-        let Some((penalty, scale)) = self.strength(&basis, &solution, strengths)? else {
+        let Some(Held { penalty, scale, roughness }) =
+            self.strength(&basis, &solution, strengths)?
+        else {
             return Ok(None);
         };
         // In units of the readings' real noise.
-        let whitened = Penalty { strength: penalty.strength * scale, ..penalty };
-        let prior = Prior::new(&basis, whitened)?;
+        let prior = Prior::of(roughness.as_ref(), penalty.strength * scale);
         let Some(found) = self.left_out(&rows, &solution, &prior, scale, folds) else {
             return Ok(None);
         };
@@ -97,13 +106,13 @@ impl Family {
         Ok(Some((Trial { penalty, ..trial }, residuals)))
     }
 
-    /// The likeliest penalty, and the variance of the readings over their stated one.
+    /// The likeliest penalty.
     fn strength(
         &self,
         basis: &Basis,
         solution: &Solution,
         strengths: Strengths,
-    ) -> Result<Option<(Penalty, f64)>, FitError> {
+    ) -> Result<Option<Held>, FitError> {
         let n = self.values.len();
         let is_held = strengths.power != Some(0.0) && strengths.strength != Some(0.0);
         if !is_held || basis.len() == 1 {
@@ -113,13 +122,13 @@ impl Family {
                 return Ok(None);
             }
             let scale = (solution.residual_squares(0) / (n - p) as f64).max(strengths.scale_min);
-            return Ok(Some((Penalty::NONE, scale)));
+            return Ok(Some(Held { penalty: Penalty::NONE, scale, roughness: None }));
         }
         let splines = matches!(basis.spec().angular, Angular::Splines { .. });
         let some = [strengths.power.unwrap_or(2.0)];
         let is_open = strengths.power.is_none() && !splines;
         let powers: [&[f64]; 2] = if is_open { [&SMOOTHER, &ROUGHER] } else { [&some, &[]] };
-        let mut best: Option<(f64, Likeliest)> = None;
+        let mut best: Option<(f64, Likeliest, Roughness)> = None;
         // The deviance has one valley over the powers: down it until it rises.
         for way in powers {
             for &power in way {
@@ -130,16 +139,20 @@ impl Family {
                     None => evidence.likeliest(),
                 };
                 let Some(found) = found else { continue };
-                if best.is_some_and(|(_, best)| found.deviance >= best.deviance) {
+                if best.as_ref().is_some_and(|(_, best, _)| found.deviance >= best.deviance) {
                     break;
                 }
-                best = Some((power, found));
+                best = Some((power, found, roughness));
             }
-            if best.is_some_and(|(power, _)| power > SMOOTHER[0]) {
+            if best.as_ref().is_some_and(|(power, ..)| *power > SMOOTHER[0]) {
                 break;
             }
         }
-        Ok(best.map(|(power, found)| (Penalty { power, strength: found.strength }, found.scale)))
+        Ok(best.map(|(power, Likeliest { strength, scale, .. }, roughness)| Held {
+            penalty: Penalty { power, strength },
+            scale,
+            roughness: Some(roughness),
+        }))
     }
 
     /// How well readings left out fold by fold are foretold, and the residuals of all.
@@ -210,9 +223,9 @@ impl Family {
     }
 
     /// The columns of a smaller basis.
-    fn columns(&self, spec: BasisSpec) -> Mat<f64> {
+    fn columns(&self, spec: BasisSpec) -> Cow<'_, Mat<f64>> {
         if spec == self.spec {
-            return self.rows.clone();
+            return Cow::Borrowed(&self.rows);
         }
         let width = self.spec.angular.len();
         let angular = angular_columns(self.spec.angular, spec.angular);
@@ -222,7 +235,8 @@ impl Family {
         };
         let columns: Vec<usize> =
             (0..places).flat_map(|q| angular.iter().map(move |j| q * width + j)).collect();
-        Mat::from_fn(self.rows.nrows(), columns.len(), |i, j| self.rows[(i, columns[j])])
+        let entry = |i, j: usize| self.rows[(i, columns[j])];
+        Cow::Owned(Mat::from_fn(self.rows.nrows(), columns.len(), entry))
     }
 }
 

@@ -7,20 +7,22 @@ use crate::domain::DomainError;
 /// neighbours are nearly alike.
 pub const DEGREE_MAX: usize = 15;
 
-/// The functions that are not zero around a place, in the order of their supports.
+/// The functions that are not zero around a place, in the order of their supports, with room for
+/// so many: that of any degree, or less to move about.
 /// Who needs it: rows of a fit's design matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Active {
+pub struct Active<const ROOM: usize = { DEGREE_MAX + 1 }> {
     first: usize,
     count: usize,
     /// Of all functions: round a circle, the place after the last is the first.
     len: usize,
-    values: [f64; DEGREE_MAX + 1],
+    values: [f64; ROOM],
 }
 
-impl Active {
+impl<const ROOM: usize> Active<ROOM> {
+    #[inline]
     pub(super) const fn new(first: usize, degree: usize, len: usize) -> Self {
-        Self { first, count: degree + 1, len, values: [0.0; DEGREE_MAX + 1] }
+        Self { first, count: degree + 1, len, values: [0.0; ROOM] }
     }
 
     /// Place among all functions, and value.
@@ -50,7 +52,7 @@ impl Active {
     /// Values by the recurrence up to a degree, derivatives from there to the full degree.
     /// `knots`: from the start of the first function's support on.
     pub(super) fn raise(&mut self, knots: &[f64], x: f64, to: usize) -> Result<(), DomainError> {
-        raise(&mut self.values, knots, x, self.count - 1, to);
+        raise(&mut self.values[..self.count], knots, x, self.count - 1, to);
         if self.values().iter().all(|value| value.is_finite()) {
             Ok(())
         } else {
@@ -60,7 +62,7 @@ impl Active {
 }
 
 /// The recurrences of [`Active::raise`].
-fn raise(values: &mut [f64; DEGREE_MAX + 1], knots: &[f64], x: f64, degree: usize, to: usize) {
+fn raise(values: &mut [f64], knots: &[f64], x: f64, degree: usize, to: usize) {
     values[0] = 1.0;
     // x lies between the knots at places `degree` and `degree + 1`.
     for reached in 0..to {

@@ -136,8 +136,19 @@ impl BSpline {
     /// The same for the derivatives of an order; 0 all of them above the degree. Where a derivative
     /// jumps it is that from the right (at the domain's end: from the left). An error where it is
     /// beyond the largest double.
-    #[inline]
     pub fn nonzero_derivatives(&self, x: f64, order: usize) -> Result<Active, DomainError> {
+        self.active(x, order)
+    }
+
+    /// The same with as much room as the caller asks for, who knows the degree: more than that, or it
+    /// panics.
+    #[inline]
+    pub fn active<const ROOM: usize>(
+        &self,
+        x: f64,
+        order: usize,
+    ) -> Result<Active<ROOM>, DomainError> {
+        assert!(self.degree < ROOM, "room for all functions that are not zero");
         let x = self.reduced(x)?;
         let span = self.pieces.span(&self.knots, self.degree, x);
         let first = span - self.degree;
