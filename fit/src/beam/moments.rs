@@ -106,15 +106,14 @@ impl Averager {
 /// rising degree, and in each by rising power of the second.
 struct Powers {
     degree: usize,
-    /// xᵃ yᵇ, by rising a + b and then b.
-    polynomials: Vec<Vec<f64>>,
+    /// xᵃ yᵇ, by rising a + b and then b, each with room for the highest.
+    polynomials: Vec<f64>,
 }
 
 impl Powers {
     fn new(degree: usize) -> Self {
-        let count = term(degree, degree) + 1;
-        let mut polynomials = vec![vec![0.0; count]; count];
-        polynomials[0][0] = 1.0;
+        let mut polynomials = vec![0.0; count(degree) * count(degree)];
+        polynomials[0] = 1.0;
         Self { degree, polynomials }
     }
 
@@ -127,25 +126,35 @@ impl Powers {
             }
             self.multiply(term(total, total), y, term(total + 1, total + 1), total);
         }
-        for (mean, polynomial) in means.iter_mut().zip(&self.polynomials) {
-            *mean = dot(polynomial, of_others);
+        let mut polynomials = self.polynomials.chunks_exact(count(self.degree)).zip(means);
+        for total in 0..=self.degree {
+            for (polynomial, mean) in polynomials.by_ref().take(total + 1) {
+                *mean = dot(&polynomial[..count(total)], of_others);
+            }
         }
     }
 
     /// Makes one polynomial another one, of a degree, times a linear one.
     fn multiply(&mut self, from: usize, by: [f64; 3], to: usize, degree: usize) {
-        let (before, after) = self.polynomials.split_at_mut(to);
-        let (from, to) = (&before[from], &mut after[0]);
-        to[..=term(degree + 1, degree + 1)].fill(0.0);
+        let room = count(self.degree);
+        let (before, after) = self.polynomials.split_at_mut(to * room);
+        let (from, to) = (&before[from * room..][..count(degree)], &mut after[..count(degree + 1)]);
+        to.fill(0.0);
         for total in 0..=degree {
-            for of_second in 0..=total {
-                let value = from[term(total, of_second)];
-                to[term(total, of_second)] += by[0] * value;
-                to[term(total + 1, of_second)] += by[1] * value;
-                to[term(total + 1, of_second + 1)] += by[2] * value;
+            let own = &from[term(total, 0)..][..=total];
+            let (low, high) = to[term(total, 0)..].split_at_mut(total + 1);
+            for (i, value) in own.iter().enumerate() {
+                low[i] += by[0] * value;
+                high[i] += by[1] * value;
+                high[i + 1] += by[2] * value;
             }
         }
     }
+}
+
+/// Products of powers up to this degree in all.
+const fn count(degree: usize) -> usize {
+    term(degree + 1, 0)
 }
 
 /// The place of a product of powers of this degree in all, the second's being this one.

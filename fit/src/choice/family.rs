@@ -13,8 +13,9 @@ use crate::beam::design::Design;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
 use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par, Side};
+use faer::{Accum, Mat, Par, Side};
 use std::borrow::Cow;
 
 /// Whitened rows and values of the readings that a choice is made from.
@@ -181,7 +182,19 @@ impl Family {
         let c = Mat::from_fn(p, 1, |i, _| unknowns[i]);
         let s = solution.inverse_matrix();
         let fitted = rows * &c;
-        let spread = rows * &s;
+        // S is upper triangular: half of the products are by nothing.
+        let mut spread = Mat::zeros(rows.nrows(), p);
+        triangular::matmul(
+            spread.as_mut(),
+            BlockStructure::Rectangular,
+            Accum::Replace,
+            rows.as_ref(),
+            BlockStructure::Rectangular,
+            s.as_ref(),
+            BlockStructure::TriangularUpper,
+            1.0,
+            Par::Seq,
+        );
         let determined_min = if prior.is_none() { DETERMINED_MIN } else { 0.0 };
         let (mut score, mut squares, mut count) = (0.0, 0.0, 0);
         for fold in folds {

@@ -26,7 +26,7 @@ use crate::rig::{AxisPositions, Latched, Reading, Rig};
 use between::Between;
 use checked::{Checked, checked};
 use scans::{Scan, scans};
-use verdict::largest;
+use verdict::{follows, largest};
 
 pub use gaps::Gaps;
 pub use verdict::Verdict;
@@ -79,9 +79,11 @@ pub struct Account {
     pub checked_upper_relative: Option<f64>,
     /// Noise of one reading, relative to the radiance's RMS.
     pub noise_relative: Option<f64>,
-    /// The exitance's combined uncertainty, where the plan asks for it.
+    /// The exitance's combined uncertainty, where the plan asks for it; `None` while the run goes on where
+    /// checks don't bear the fit out.
     pub exitance_u_relative: Option<f64>,
-    /// That of the exitance within the region, without the common scale, where the plan asks for it.
+    /// That of the exitance within the region, without the common scale, where the plan asks for it; as
+    /// before.
     #[serde(default)]
     pub exitance_within_region_u_relative: Option<f64>,
     /// Uncertainty of the dark level, relative to the radiance's RMS.
@@ -222,8 +224,16 @@ fn looked<T>(
         verdict: None,
     };
     let calibrated = &calibrated;
-    let mut state =
-        State { terms, calibrated, scans: &scans, between, before, whole: None, is_asked: false };
+    let mut state = State {
+        terms,
+        calibrated,
+        scans: &scans,
+        between,
+        before,
+        known: None,
+        whole: None,
+        is_asked: false,
+    };
     let made = judge(&mut state, &mut account);
     Ok((account, made))
 }
@@ -234,6 +244,8 @@ struct State<'s> {
     scans: &'s [Scan],
     between: Between,
     before: &'s [Account],
+    /// The basis that the readings of all but the checks asked for, once they were asked.
+    known: Option<fit::Chosen>,
     /// The fit of all readings, once it was asked for.
     whole: Option<fit::Fit>,
     /// Whether fits were asked.
@@ -255,6 +267,7 @@ impl State<'_> {
                 Err(why) => ending = Some(self.last_word(account, why)),
             }
         }
+        self.ask_whole(account);
         account.verdict = ending;
         Choice::Enough
     }
@@ -265,38 +278,48 @@ impl State<'_> {
         if !self.is_asked {
             self.ask_fit(account);
         }
+        self.ask_whole(account);
         let largest = largest(account);
         self.met(account).unwrap_or(Verdict { is_met: false, why, largest })
     }
 
-    /// What the checks, and the exitance's own uncertainty, say of a fit.
+    /// What the checks say of a fit; and the exitance's own uncertainty, if they bear it out. Of a fit that
+    /// they don't, nothing follows.
     fn ask_fit(&mut self, account: &mut Account) {
         self.is_asked = true;
-        let mut known = None;
-        if self.terms.adaptive.radiance_relative.is_some() {
+        let asked = self.terms.adaptive.radiance_relative;
+        if asked.is_some() {
             let mean_square = self.between.mean_square();
             // A fit that is refused says nothing yet; more sweeps determine it.
             let found = checked(self.terms, self.calibrated, self.scans, mean_square);
             if let Ok(Some(Checked { chosen, relative, upper_relative })) = found {
-                known = Some(chosen);
+                self.known = Some(chosen);
                 account.checked_relative = Some(relative);
                 account.checked_upper_relative = Some(upper_relative);
             }
         }
-        if self.terms.adaptive.asks_exitance() {
-            let Terms { plan, region, optics, .. } = self.terms;
-            let optics = optics.as_ref();
-            // The basis that all but the checks ask for is the one of all: choosing it takes longest.
-            let whole = match &known {
-                Some(known) => self.calibrated.fit_known(region, known, &plan.fit.rules, optics),
-                None => self.calibrated.fit(region, &plan.fit, optics).map(|fitted| fitted.fit),
-            };
-            self.whole = whole.ok();
-            account.exitance_u_relative = self.whole.as_ref().and_then(|fit| u(fit.exitance()));
-            let shape = self.whole.as_ref().map(|fit| fit.without_scale(&self.calibrated.scales()));
-            account.exitance_within_region_u_relative =
-                shape.and_then(|fit| u(fit.exitance_within_region()));
+        if asked.is_none_or(|asked| follows(asked, account)) {
+            self.ask_whole(account);
         }
+    }
+
+    /// What a fit of all readings says of the exitance, where the plan asks for it; once.
+    fn ask_whole(&mut self, account: &mut Account) {
+        if self.whole.is_some() || !self.terms.adaptive.asks_exitance() {
+            return;
+        }
+        let Terms { plan, region, optics, .. } = self.terms;
+        let optics = optics.as_ref();
+        // The basis that all but the checks ask for is the one of all: choosing it takes longest.
+        let whole = match &self.known {
+            Some(known) => self.calibrated.fit_known(region, known, &plan.fit.rules, optics),
+            None => self.calibrated.fit(region, &plan.fit, optics).map(|fitted| fitted.fit),
+        };
+        self.whole = whole.ok();
+        account.exitance_u_relative = self.whole.as_ref().and_then(|fit| u(fit.exitance()));
+        let shape = self.whole.as_ref().map(|fit| fit.without_scale(&self.calibrated.scales()));
+        account.exitance_within_region_u_relative =
+            shape.and_then(|fit| u(fit.exitance_within_region()));
     }
 
     /// The pace of sweeps that are not chosen for their place: the plan's where a value's noise is below

@@ -174,7 +174,7 @@ pub(super) fn largest(account: &Account) -> Option<(String, f64)> {
 
 /// Whether the checks are met as well as is asked, or nearly as well as what lies between the sweeps; true
 /// where there are none.
-fn follows(asked: f64, account: &Account) -> bool {
+pub(super) fn follows(asked: f64, account: &Account) -> bool {
     let between = account.between_relative.unwrap_or(0.0);
     account.checked_relative.is_none_or(|checked| checked <= asked.max(STUCK * between))
 }
