@@ -57,12 +57,11 @@ impl Fit {
             for &(u, v) in &directions {
                 let place = Place { u, v, a, b };
                 let ray = place.ray(self.region());
-                let value = match basis.directions().local() {
-                    Some(splines) => splines.value(&folded, ray.theta_rad, ray.phi_rad),
-                    None => {
-                        basis.direction_of(&ray, &mut scratch, &mut z);
-                        dot(&folded, &z)
-                    }
+                let value = if let Some(splines) = basis.directions().local() {
+                    splines.value(&folded, ray.theta_rad, ray.phi_rad)
+                } else {
+                    basis.direction_of(&ray, &mut scratch, &mut z);
+                    dot(&folded, &z)
                 };
                 keep(&mut starts, place, value);
             }

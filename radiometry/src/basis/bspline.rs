@@ -31,7 +31,7 @@ pub struct BSpline {
     knots: Vec<f64>,
     len: usize,
     is_periodic: bool,
-    pieces: Pieces,
+    pieces: Box<Pieces>,
 }
 
 impl BSpline {
@@ -283,7 +283,7 @@ impl BSpline {
         let end = knots.len() - 1 - degree;
         let extent = knots[end] - knots[degree];
         if extent > 0.0 {
-            let pieces = Pieces::new(&knots, degree, end);
+            let pieces = Box::new(Pieces::new(&knots, degree, end));
             Ok(Self { degree, knots, len, is_periodic, pieces })
         } else {
             Err(DomainError::NotPositive { argument: "the domain's extent", value: extent })
