@@ -267,20 +267,27 @@ fn a_share_is_looked_at_once_and_refuses_what_takes_more() {
 
 #[test]
 fn a_run_is_a_share_too() {
-    // More than a block of readings.
-    let bench = Bench::small().with("plan.toml", "phi_step_deg = 45", "phi_step_deg = 10").with(
+    // More than a block of readings; and some that were taken in flight.
+    let several = Bench::small().with("plan.toml", "phi_step_deg = 45", "phi_step_deg = 10").with(
         "plan.toml",
         "theta_step_deg = 20",
         "theta_step_deg = 10",
     );
-    bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
-    bench.gonio(&["fit", "out", "--partial", "-o", "out.bin"]).well();
-    let merged = bench.gonio(&["fit", "--merge", "out.bin", "--json"]).well().json();
-    let whole = bench.json("out/fit.json");
-    assert!(merged["n_used"].as_u64().unwrap() > 1024, "{}", merged["n_used"]);
-    assert_eq!(merged["region"], whole["region"]);
-    for key in ["coefficients", "covariance", "n_used", "dof", "n_flagged", "n_excluded"] {
-        assert_close(&merged[key], &whole[key], 1e-6);
+    let swept = "kind = \"sweep\"\nnarrowest_feature_deg = 20";
+    let flown = Bench::small()
+        .with("plan.toml", "kind = \"raster\"", swept)
+        .with("plan.toml", "theta_step_deg = 20\n", "")
+        .with("plan.toml", "order = \"travel\"\n", "");
+    for (bench, least) in [(several, 1025), (flown, 100)] {
+        bench.gonio(&["run", "plan.toml", "--out", "out"]).well();
+        bench.gonio(&["fit", "out", "--partial", "-o", "out.bin"]).well();
+        let merged = bench.gonio(&["fit", "--merge", "out.bin", "--json"]).well().json();
+        let whole = bench.json("out/fit.json");
+        assert!(merged["n_used"].as_u64().unwrap() >= least, "{}", merged["n_used"]);
+        assert_eq!(merged["region"], whole["region"]);
+        for key in ["coefficients", "covariance", "n_used", "dof", "n_flagged", "n_excluded"] {
+            assert_close(&merged[key], &whole[key], 1e-6);
+        }
     }
 }
 

@@ -33,6 +33,9 @@ const COEFFICIENTS_CHOSEN: usize = 30;
 const GROWTH: f64 = 1.1;
 /// Readings that are kept to be fitted anew: some 10 MB with all that is made of them.
 const KEPT_MAX: usize = 20_000;
+/// The same where fewer don't determine the fit, as of a raster that comes late to its other places: twice as
+/// many are tried, and again.
+const KEPT_MOST: usize = 80_000;
 
 /// The rule for a run, whose journal may have readings from earlier sessions. In virtual time, where nobody
 /// watches and every fit would be waited for, there is none where the plan has no target.
@@ -118,7 +121,7 @@ impl Target {
             Form::Kept(readings) => {
                 readings.push(reading.clone());
                 if readings.len() >= self.kept_max {
-                    self.form = self.without_readings();
+                    self.let_go();
                 }
             }
             Form::Live(live) => {
@@ -130,20 +133,28 @@ impl Target {
         }
     }
 
-    /// Lets go of the readings that were kept.
-    fn without_readings(&mut self) -> Form {
+    /// Lets go of the readings that were kept, if they foretell the rest, or are too many.
+    fn let_go(&mut self) {
         let Form::Kept(readings) = std::mem::replace(&mut self.form, Form::Journalled) else {
-            return Form::Journalled;
+            return;
         };
+        if let Some(live) = self.begun(&readings) {
+            self.form = Form::Live(Box::new(live));
+        } else if 2 * self.kept_max <= KEPT_MOST {
+            self.kept_max *= 2;
+            self.form = Form::Kept(readings);
+        }
+    }
+
+    fn begun(&mut self, readings: &[Reading]) -> Option<LiveFit> {
         if self.chosen.is_none()
-            && let Ok(calibrated) = calibrate(&self.rig, &readings)
+            && let Ok(calibrated) = calibrate(&self.rig, readings)
         {
             self.fitted(&calibrated);
         }
-        let Some((chosen, _)) = &self.chosen else { return Form::Journalled };
+        let (chosen, _) = self.chosen.as_ref()?;
         let asked = (&self.region, chosen.model, self.optics.as_ref());
-        let live = LiveFit::begin(&self.rig, &readings, asked, &self.wish.rules);
-        live.map_or(Form::Journalled, |live| Form::Live(Box::new(live)))
+        LiveFit::begin(&self.rig, readings, asked, &self.wish.rules)
     }
 
     fn so_far(&mut self, rig_s: f64) -> Option<Said> {

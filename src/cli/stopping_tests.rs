@@ -67,6 +67,20 @@ fn beyond_what_is_kept_a_run_is_said_to_be_as_accurate_as_by_all_its_readings() 
 }
 
 #[test]
+fn readings_that_do_not_determine_the_fit_yet_are_kept_for_longer() {
+    let folder = TempDir::new().unwrap();
+    let VirtualRun { setup, readings, rig_s } = run(&folder);
+    let coefficients = setup.plan.fit.decided().unwrap().basis.len();
+    let first = coefficients / 2;
+    let early = shown(target(&setup, &folder, first), &readings[..=first]);
+    assert!(matches!(&early.form, Form::Kept(kept) if kept.len() == first + 1));
+    let mut late = shown(target(&setup, &folder, first), &readings);
+    assert!(matches!(late.form, Form::Live(_)));
+    let whole = shown(target(&setup, &folder, usize::MAX), &readings).trend(rig_s).unwrap();
+    assert_near(late.trend(rig_s).unwrap(), whole, 0.1);
+}
+
+#[test]
 fn what_first_readings_do_not_foretell_and_the_last_word_are_the_journals() {
     let folder = TempDir::new().unwrap();
     let VirtualRun { setup, mut readings, rig_s } = run(&folder);
