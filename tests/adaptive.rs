@@ -379,6 +379,28 @@ fn a_target_below_what_all_readings_share_is_given_up_with_the_floor() {
 }
 
 #[test]
+fn what_all_readings_share_is_that_of_the_target_s_own_directions() {
+    let wanted = "exitance_within_region_relative = 0.00001";
+    // A basis that readings choose goes on beyond the region as it may.
+    let bench = Bench::of("adaptive").with("plan.toml", "radiance_relative = 0.02", wanted);
+    let (said, _) = run(&bench);
+    assert_eq!(said.code, Some(1), "{said}");
+    let (_, shared) = said.err.split_once("what all readings share is ").unwrap();
+    let shared = 0.01 * shared.split_once(" %").unwrap().0.parse::<f64>().unwrap();
+    // Of the hemisphere it is more: what poses do to a fit grows where nothing was measured.
+    let exitance = &bench.json("out/fit.json")["exitance_w_per_m2"];
+    let is_shape = |name: &str| {
+        let others = ["independent", "truncation", "extrapolation", "responsivity", "throughput"];
+        !others.contains(&name) && !name.starts_with("gain ")
+    };
+    let rows = exitance["budget"].as_array().unwrap().iter();
+    let rows = rows.filter(|row| is_shape(row["name"].as_str().unwrap()));
+    let squares: f64 = rows.map(|row| number(&row["u"]).powi(2)).sum();
+    let hemisphere = squares.sqrt() / number(&exitance["value"]);
+    assert!(shared > 1e-5 && shared < 0.6 * hemisphere, "{shared} {hemisphere}");
+}
+
+#[test]
 fn a_plan_says_what_its_first_round_takes_and_how_long_at_most() {
     let bench = bench();
     let said = bench.gonio(&["plan", "plan.toml"]);
