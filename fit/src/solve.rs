@@ -225,25 +225,6 @@ pub(crate) fn ready(
     refusal.map_or(Ok((basis, prior)), Err)
 }
 
-/// The triangle of samples weighted by what their own fit says, every common component a side of its
-/// own, without the penalty; and their variances.
-pub(crate) fn weighted(
-    samples: &[Sample],
-    region: &Region,
-    model: Penalised,
-    common: &[Common],
-    optics: Option<&Optics>,
-) -> Result<(Triangle, Vec<f64>), FitError> {
-    let (basis, prior) = ready(samples, region, model, common)?;
-    let design = Design::new(samples, &basis, optics)?;
-    let (common, jitters): (Vec<&Common>, Vec<&Common>) =
-        common.iter().partition(|common| common.shift.is_shared());
-    let settled = settle(&design, &prior, &Readings::of(samples), &jitters)?;
-    let sides = sensitivities(&design, &settled, &common)?;
-    let triangle = triangle(&design, &settled.rows(), &sides)?;
-    Ok((triangle, settled.variances))
-}
-
 /// What the field makes of the samples' readings.
 pub(crate) fn levels(design: &Design<'_>, coefficients: &[f64]) -> Vec<f64> {
     let mut room = design.room();

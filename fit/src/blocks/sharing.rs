@@ -1,5 +1,4 @@
-//! A share of more readings, which is fitted by itself first, in blocks: what [`Partial::of`] makes of
-//! readings that are there.
+//! A share of more readings, which is fitted by itself first, in blocks.
 
 use super::fitting::Fitting;
 use super::{Asked, Blocks, Totals};
@@ -7,9 +6,9 @@ use crate::partial::{Partial, Sums};
 use crate::solve::{absorb, begun, sensitivities};
 use crate::{Common, FitError};
 
-/// A share of the readings, weighted by its own fit, every common component carried along. Three walks where
-/// they scatter as they say; as in [`Partial::of`] no reading is an outlier, none a limit, and nothing is fitted along: of
-/// `asked` region, model and optics count.
+/// A share of the readings: each the mean over its way, weighted by their own fit, which tells its level and
+/// so its noise, every common component carried along. Three walks where they scatter as they say. Of
+/// `asked` region, model and optics count; limits and nuisances are refused.
 pub fn share<B: Blocks>(
     blocks: &mut B,
     totals: &Totals,
@@ -22,7 +21,9 @@ pub fn share<B: Blocks>(
     let mut sums = Sums::NONE;
     fitting.walk(blocks, |block, design| {
         if !(block.nuisances.is_empty() && block.limits.is_empty()) {
-            return Err(FitError::Parts { what: "nuisances of a share", expected: 0, found: 1 });
+            let (what, found) =
+                ("limits and nuisances of a share", block.limits.len() + block.nuisances.len());
+            return Err(FitError::Parts { what, expected: 0, found });
         }
         let settled = fitting.known.settled(block, design, Some(&pass))?;
         let common: Vec<&Common> = block.common.iter().filter(|c| c.shift.is_shared()).collect();

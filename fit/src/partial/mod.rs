@@ -40,7 +40,7 @@ use crate::beam::Optics;
 use crate::beam::design::Design;
 use crate::check::check_sample;
 use crate::triangle::Triangle;
-use crate::{BasisSpec, Common, FitError, Noise, Penalised, Penalty, Region, Sample};
+use crate::{BasisSpec, FitError, Noise, Penalised, Penalty, Region, Sample};
 
 mod closing;
 
@@ -205,27 +205,6 @@ impl Accumulator {
 }
 
 impl Partial {
-    /// A share that is fitted by itself first, which tells the level of each reading and so its
-    /// noise, and what each common component does to it.
-    pub fn of(
-        samples: &[Sample],
-        region: &Region,
-        model: impl Into<Penalised>,
-        common: &[Common],
-        optics: Option<&Optics>,
-    ) -> Result<Self, FitError> {
-        let model = model.into();
-        let (triangle, variances) = crate::solve::weighted(samples, region, model, common, optics)?;
-        let mut sums = Sums::NONE;
-        for (sample, variance) in samples.iter().zip(&variances) {
-            sums.note(sample.value, *variance);
-        }
-        let shared = common.iter().filter(|common| common.shift.is_shared());
-        let common = shared.map(|common| common.name.clone()).collect();
-        let basis = Basis::new(model.basis, *region)?;
-        Ok(Self::weighted(basis, model.penalty, common, sums, triangle))
-    }
-
     /// Of rows that its own fit weighted, the common components their sides.
     pub(crate) fn weighted(
         basis: Basis,

@@ -1,8 +1,9 @@
 //! Shares against the whole.
 
 use super::*;
+use crate::blocks::{self, Asked, Blocks, Totals};
 use crate::scattered::{BASIS, REGION, reading};
-use crate::{Fit, Ray, Shift};
+use crate::{Common, Fit, Ray, Readings, Robust, Shift};
 
 /// Readings of a field that the basis holds, scattering by 0.41.
 fn samples(count: usize, u: impl Fn(usize) -> Option<f64>) -> Vec<Sample> {
@@ -76,21 +77,94 @@ fn scatter_beyond_the_stated_noise_is_said() {
     );
 }
 
+/// Samples taken in flight, with what they share, in blocks.
+struct Taken<'s> {
+    samples: &'s [Sample],
+    ways: &'s [Option<(Ray, Ray)>],
+    block: usize,
+}
+
+impl Taken<'_> {
+    /// The components of the samples from one on.
+    fn common(from: usize) -> [Common; 4] {
+        let tilt = |_: usize, ray: &Ray| Ray { theta_rad: ray.theta_rad + 1e-3, ..*ray };
+        let value = move |i: usize, _: f64| (from + i) as f64 * 1e-3;
+        [
+            Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale },
+            Common { name: "dark".into(), u: 0.3, shift: Shift::Offset },
+            Common { name: "axis".into(), u: 1.0, shift: Shift::Ray(Box::new(tilt)) },
+            Common { name: "drift".into(), u: 1.0, shift: Shift::Value(Box::new(value)) },
+        ]
+    }
+
+    fn share(mut self) -> Partial {
+        let mut totals = Totals::default();
+        let counted = self.each(&mut |block| {
+            totals.take(block);
+            Ok(())
+        });
+        counted.unwrap();
+        let asked = Asked {
+            region: REGION,
+            model: BASIS.into(),
+            robust: Robust::None,
+            optics: None,
+            with_truncation: false,
+            others: &[],
+        };
+        let share = blocks::share(&mut self, &totals, &asked).unwrap();
+        Partial::from_parts(share.parts()).unwrap()
+    }
+}
+
+impl Blocks for Taken<'_> {
+    type Error = FitError;
+
+    fn each(
+        &mut self,
+        take: &mut dyn FnMut(&Readings<'_>) -> Result<(), FitError>,
+    ) -> Result<(), FitError> {
+        let ways = self.ways.chunks(self.block);
+        for (k, (samples, flown)) in self.samples.chunks(self.block).zip(ways).enumerate() {
+            let common = Self::common(k * self.block);
+            take(&Readings { flown, common: &common, ..Readings::of(samples) })?;
+        }
+        Ok(())
+    }
+}
+
 #[test]
 fn a_share_with_common_components_equals_its_fit() {
-    let samples = samples(900, |_| Some(0.5));
-    let tilt = |_: usize, ray: &Ray| Ray { theta_rad: ray.theta_rad + 1e-3, ..*ray };
-    let value = |i: usize, _: f64| i as f64 * 1e-3;
-    let common = [
-        Common { name: "responsivity".into(), u: 0.02, shift: Shift::Scale },
-        Common { name: "dark".into(), u: 0.3, shift: Shift::Offset },
-        Common { name: "axis".into(), u: 1.0, shift: Shift::Ray(Box::new(tilt)) },
-        Common { name: "drift".into(), u: 1.0, shift: Shift::Value(Box::new(value)) },
-    ];
-    let whole = crate::fit(&samples, &REGION, BASIS, &common).unwrap();
-    let part = Partial::of(&samples, &REGION, BASIS, &common, None).unwrap();
-    let part = Partial::from_parts(part.parts()).unwrap();
-    assert_alike(&part.fit(None).unwrap(), &whole, 1e-9);
+    let way = |sample: &Sample| {
+        let at = |theta_rad| Ray { theta_rad, ..sample.ray };
+        let theta_rad = sample.ray.theta_rad;
+        (theta_rad < 1.1).then(|| (at(theta_rad), at(theta_rad + 0.2)))
+    };
+    let of = |u: f64| {
+        let samples = samples(900, |_| Some(u));
+        let ways: Vec<_> = samples.iter().map(way).collect();
+        (samples, ways)
+    };
+    let (samples, ways) = of(0.5);
+    let common = Taken::common(0);
+    let readings = Readings { flown: &ways, common: &common, ..Readings::of(&samples) };
+    let whole = crate::fit_readings(&readings, &REGION, BASIS, None).unwrap();
+    // That they were taken in flight tells.
+    let at_rest = crate::fit(&samples, &REGION, BASIS, &common).unwrap();
+    let value = |fit: &Fit| fit.exitance().value;
+    assert!((value(&at_rest) / value(&whole) - 1.0).abs() > 1e-6);
+    for block in [900, 170] {
+        let share = Taken { samples: &samples, ways: &ways, block }.share();
+        assert_eq!(share.readings(), 900);
+        assert_alike(&share.fit(None).unwrap(), &whole, 1e-9);
+    }
+    // Where they scatter beyond what they state, in blocks as at once.
+    let (samples, ways) = of(0.1);
+    let [at_once, blocks] = [900, 170].map(|block| {
+        let share = Taken { samples: &samples, ways: &ways, block }.share();
+        share.fit(None).unwrap()
+    });
+    assert_alike(&blocks, &at_once, 1e-5);
 }
 
 #[test]

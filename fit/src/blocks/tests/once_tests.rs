@@ -1,56 +1,7 @@
-//! Shares of readings and fits that go on, which take each reading in once, against the fit of all.
+//! Fits that go on, which take each reading in once, against the fit of all.
 
-use super::super::{Live, share as share_by_walks};
+use super::super::Live;
 use super::*;
-use crate::partial::Partial;
-
-#[test]
-fn a_share_by_walks_is_the_share_of_readings_that_are_there() {
-    // Uncertainties that explain the scatter, and some that do not; a component that each reading has its own
-    // share of.
-    for (u, tolerance) in [(0.5, 1e-11), (0.1, 1e-5)] {
-        let mut source = Source::new(|_, _| Noise::Fixed { variance: u * u }, false);
-        source.common = |from| {
-            let tilt = move |i: usize, level: f64| level * 1e-3 * ((from + i) % 7) as f64;
-            vec![
-                Common { name: "scale".to_owned(), u: 0.01, shift: Shift::Scale },
-                Common { name: "tilt".to_owned(), u: 1.0, shift: Shift::Value(Box::new(tilt)) },
-            ]
-        };
-        let (model, common) = (Penalised::from(BASIS), (source.common)(0));
-        let whole = Partial::of(&source.samples, &REGION, model, &common, None).unwrap();
-        let mut totals = Totals::default();
-        source
-            .each(&mut |block| {
-                totals.take(block);
-                Ok(())
-            })
-            .unwrap();
-        let asked = Asked {
-            region: REGION,
-            model,
-            robust: Robust::None,
-            optics: None,
-            with_truncation: false,
-            others: &[],
-        };
-        let share = share_by_walks(&mut source, &totals, &asked).unwrap();
-        let (found, expected) = (share.parts(), whole.parts());
-        assert_eq!((found.common, found.sums.readings), (expected.common, expected.sums.readings));
-        let largest = expected.triangle.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
-        // By columns. What is left of components beyond functions and values has no direction of its own.
-        let columns = (0..).flat_map(|column| 0..=column);
-        let entries = columns.zip(found.triangle.iter().zip(&expected.triangle));
-        for (_, (a, b)) in entries.filter(|(row, _)| *row <= BASIS.len()) {
-            // The sign of a row is nobody's.
-            assert!((a.abs() - b.abs()).abs() <= tolerance * largest, "{a} {b}");
-        }
-        let [found, expected] = [share, whole].map(|share| share.fit(None).unwrap().exitance());
-        for (a, b) in [(found.value, expected.value), (found.u, expected.u)] {
-            assert!((a / b - 1.0).abs() < tolerance, "{a} {b}");
-        }
-    }
-}
 
 #[test]
 fn a_live_fit_takes_each_reading_once_and_is_the_fit_of_all() {
