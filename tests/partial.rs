@@ -258,6 +258,8 @@ fn a_share_is_looked_at_once_and_refuses_what_takes_more() {
         let arguments = [&["fit", "a.csv", "-o", "no.bin"], &flags[..], &REGION[..]].concat();
         bench.gonio(&arguments).refused(&[said, "help: "]);
     }
+    let missing = ["fit", "nowhere.csv", "--partial", "-o", "no.bin"];
+    bench.gonio(&missing).refused(&["nowhere.csv: cannot be read: No such file"]);
     let twice = format!("{}{}", samples(0, 20, true), samples(3, 4, true).lines().last().unwrap());
     std::fs::write(bench.path("twice.csv"), twice).unwrap();
     bench

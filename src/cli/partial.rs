@@ -135,6 +135,9 @@ struct Share<'a> {
 fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
     let shown = args.source.display();
     let chart = args.chart.ray_chart()?;
+    let file = File::open(&args.source).map_err(|error| {
+        Failure::with_help(format!("{shown}: cannot be read: {error}"), csv_help(chart))
+    })?;
     let Some(region) = args.chart.whole_region(chart) else {
         return Err(Failure::with_help("--partial of a CSV: no region", REGION_HELP));
     };
@@ -149,9 +152,6 @@ fn of_csv(args: &FitArgs) -> Result<PartialFile, Failure> {
         n_flagged: 0,
         n_excluded: 0,
     };
-    let file = File::open(&args.source).map_err(|error| {
-        Failure::with_help(format!("{shown}: cannot be read: {error}"), csv_help(chart))
-    })?;
     let blocks = BufReader::new(file);
     read_sample_blocks(chart, blocks, |block| share.take(&block)).map_err(|error| {
         let is_taken = matches!(error, BlockError::Taken(_));
