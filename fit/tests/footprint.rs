@@ -4,7 +4,10 @@
 #[allow(dead_code)]
 mod scenes;
 
-use fit::{BasisSpec, BeamRows, Common, Noise, Optics, Outline, Ray, Region, Sample, Shift};
+use fit::{
+    AngularKind, BasisSpec, BeamRows, Common, Noise, Optics, Outline, Position, Ray, Region,
+    Sample, Shift, Wish,
+};
 use radiometry::beam::Beam;
 use radiometry::direction::{angles, unit};
 use radiometry::quadrature::Sobol;
@@ -390,4 +393,40 @@ fn of_a_source_within_the_spot_the_spots_size_does_not_matter() {
     assert!(of_spot(&fit(Some(&optics))) < 0.05, "{}", of_spot(&fit(Some(&optics))));
     // Who knows nothing of beams takes it for a scale.
     assert!((of_spot(&fit(None)) - 1.0).abs() < 1e-9, "{}", of_spot(&fit(None)));
+}
+
+/// Half as wide as the spot: no polynomial of the place that readings under a beam are given follows it.
+#[test]
+fn a_line_narrower_than_the_spot_is_found_by_splines_of_the_place() {
+    let region = region(0.012, 50.0);
+    let line = |ray: &Ray| 0.1 + 0.9 * libm::exp(-0.5 * (ray.x_m / 0.0015).powi(2));
+    let place = |i: usize, count: usize| 0.024 * ((i as f64 + 0.5) / count as f64 - 0.5);
+    let places = (0..15 * 7).map(|i| (place(i % 15, 15), place(i / 15, 7)));
+    let directions = [(0.0, 0.0), (25.0, 30.0), (50.0, 150.0)];
+    let rays: Vec<Ray> =
+        places.flat_map(|(x, y)| directions.map(|(theta, phi)| ray(x, y, theta, phi))).collect();
+    let mut die = Die::new(31);
+    let mut seen = samples(&rays, |ray| read(&stock(), ray, 1 << 10, &line));
+    for sample in &mut seen {
+        sample.value += 0.002 * die.normal();
+        sample.noise = Noise::Fixed { variance: 4e-6 };
+    }
+    let optics = Optics { beam: stock(), outline: None };
+    let off = |wish: &Wish| {
+        let (model, _) = fit::choose(&seen, &region, wish, Some(&optics)).unwrap();
+        let fit = fit::fit_seen(&seen, &region, model, &[], Some(&optics)).unwrap();
+        let rays = spread_rays(300, &region, 32);
+        let squares = rays.iter().map(|ray| (fit.value(ray) - line(ray)).powi(2));
+        (model.basis.position, (squares.sum::<f64>() / 300.0).sqrt())
+    };
+    let even = Wish {
+        kind: Some(AngularKind::Spherical),
+        angular_degree: Some(0),
+        penalty_power: Some(2.0),
+        ..Wish::default()
+    };
+    let (position, found) = off(&even);
+    assert!(matches!(position, Position::Splines { .. }), "{position:?}");
+    let (_, blurred) = off(&Wish { position_degree: Some(8), ..even });
+    assert!(found < 0.03 && found < blurred / 4.0, "{found} {blurred}");
 }

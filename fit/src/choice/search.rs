@@ -187,22 +187,50 @@ impl<'s> Search<'s> {
         Ok(())
     }
 
-    /// Tries other functions of the position with a basis of the direction.
+    /// Tries other functions of the position with a basis of the direction: polynomials of a degree less,
+    /// and of ever higher ones while these do better.
     fn places(&mut self, angular: Angular, degree: usize) -> Result<(), FitError> {
         let at = POSITION.iter().position(|d| *d == degree).unwrap_or(0);
-        let around = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
-        let mut others: Vec<Position> = around
-            .filter_map(|at| POSITION.get(at))
-            .filter(|degree| **degree <= self.position_most)
-            .map(|degree| Position::Legendre { degree: *degree })
-            .collect();
-        // Averaged over a beam, splines in position cost minutes.
-        if degree >= POSITION_SPLINES_FROM && self.optics.is_none() {
-            let spans = POSITION_SPLINES.into_iter().filter(|spans| *spans <= self.position_most);
-            others.extend(spans.map(|spans| Position::Splines { spans }));
+        if let Some(below) = at.checked_sub(1) {
+            self.rising(&[angular], Position::Legendre { degree: POSITION[below] })?;
         }
-        for position in others {
+        for degree in POSITION.into_iter().skip(at + 1) {
+            let position = Position::Legendre { degree };
+            if degree > self.position_most {
+                break;
+            }
             self.rising(&[angular], position)?;
+            if self.best(|_| true).is_none_or(|(best, _)| best.position != position) {
+                break;
+            }
+        }
+        let best = self.best(|_| true).and_then(|(best, _)| best.position.degree());
+        let degree = best.unwrap_or(degree);
+        if degree >= POSITION_SPLINES_FROM { self.splines_of_places() } else { Ok(()) }
+    }
+
+    /// Tries ever more spans in position, each with the best functions of the direction that they leave
+    /// room for: what is narrow in position may need none but coarse ones. Beam or not, up to as many
+    /// coefficients: under a spot wider than what is looked for nothing else follows it.
+    fn splines_of_places(&mut self) -> Result<(), FitError> {
+        self.coefficients_max = COEFFICIENTS_MAX.min(self.samples.len());
+        let (mut best, mut worse) = (f64::NEG_INFINITY, 0);
+        for spans in POSITION_SPLINES {
+            if spans > self.position_most {
+                break;
+            }
+            let position = Position::Splines { spans };
+            let fits = |spec: &BasisSpec| {
+                self.is_affordable(BasisSpec { angular: spec.angular, position })
+            };
+            let Some((spec, _)) = self.best(fits) else { break };
+            self.rising(&[spec.angular], position)?;
+            let Some((_, trial)) = self.best(|spec| spec.position == position) else { continue };
+            worse = if trial.score > best { 0 } else { worse + 1 };
+            best = best.max(trial.score);
+            if worse == SPANS_IN_VAIN {
+                break;
+            }
         }
         Ok(())
     }
@@ -238,7 +266,8 @@ const READINGS_MAX: usize = 6000;
 const AVERAGED_READINGS_MAX: usize = 3000;
 /// Coefficients of a basis that is chosen at most: what is finer has to be asked for by name.
 const COEFFICIENTS_MAX: usize = 1000;
-/// The same where rows are averaged over a beam, which costs milliseconds a row beyond.
+/// The same where rows are averaged over a beam, which costs milliseconds a row beyond; of splines in
+/// position as many as without.
 const AVERAGED_COEFFICIENTS_MAX: usize = 400;
 /// Folds that the sweeps are dealt into.
 const FOLDS: usize = 16;
@@ -247,6 +276,8 @@ const POSITION: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 11, 14];
 /// Spans of splines tried in position, and the degree from which on they are.
 const POSITION_SPLINES: [usize; 4] = [4, 6, 9, 12];
 const POSITION_SPLINES_FROM: usize = 4;
+/// More spans may do no better this often before still more are given up.
+const SPANS_IN_VAIN: usize = 2;
 /// Degrees in direction while that in position is looked for.
 const MIDDLING: [usize; 2] = [6, 2];
 /// Of every Zernike basis that is tried.
