@@ -231,6 +231,14 @@ NAMES = {
 }
 
 
+WHY = (
+    "Why a peer is better where it is: on the lobes cos^n splines of the same kind as ours have the smoothing that the truth "
+    "calls best. On the gloss and on the lobe that moves, our choice counts all readings left out alike: splines with a patch, "
+    "which foretell the many of the flat parts better, outweigh functions that follow the lobe better. The batwing is as smooth "
+    "everywhere as a Gaussian process takes fields to be. The bright line the peers take as the spot blurs it; our rows know the beam."
+)
+
+
 def section(rows, date, beside):
     splines = [name for name in NAMES if name != "gaussian_process"]
     lines = [
@@ -254,7 +262,7 @@ def section(rows, date, beside):
             f"| {of_splines} "
             f"| {100 * process[0]:.3f} | {process[1]:.1f} | {NAMES.get(winner, '**gonio**')} |"
         )
-    lines += ["", f"`benches/peers/fits.sh`  ", f"{date} · beside it: {beside}"]
+    lines += ["", WHY, "", f"`benches/peers/fits.sh`  ", f"{date} · beside it: {beside}"]
     return "\n".join(lines)
 
 
