@@ -82,8 +82,8 @@ pub struct Candidate {
 ///
 /// The choice depends on the samples' order by rounding alone. It is made from at most 6000 readings,
 /// whole sweeps of them, and among bases of at most 1000 coefficients (and no more than readings);
-/// where rows are averaged over a beam, from 3000 and among those of 400. Splines with a patch have up to 1000
-/// and are judged by up to 8000 readings, beam or not.
+/// where rows are averaged over a beam, from 3000 and among those of 400. Splines in position and
+/// splines with a patch have up to 1000, beam or not; the latter are judged by up to 8000 readings.
 pub fn choose(
     samples: &[Sample],
     region: &Region,
