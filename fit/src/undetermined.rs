@@ -134,9 +134,13 @@ fn plural(count: usize) -> &'static str {
 /// their scatter seems to tell.
 pub(crate) fn by_count(samples: &[Sample], basis: &Basis) -> Option<FitError> {
     let grid = Grid::of(samples, basis.region());
-    let too_few = !positions(&grid, basis).is_empty() || !directions(&grid, basis).is_empty();
     let rays = || samples.iter().map(|s| grid.snap(&s.ray)).collect::<Vec<Ray>>();
-    too_few.then(|| refusal(&rays(), &grid, basis))
+    lacks(&grid, basis).then(|| refusal(&rays(), &grid, basis))
+}
+
+/// Whether there are fewer distinct coordinates than the basis needs where nothing is held against it.
+pub(crate) fn lacks(grid: &Grid, basis: &Basis) -> bool {
+    !positions(grid, basis).is_empty() || !directions(grid, basis).is_empty()
 }
 
 /// The refusal of samples whose factorisation lacks rank.

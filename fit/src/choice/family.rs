@@ -10,13 +10,15 @@ use super::evidence::{Evidence, Likeliest};
 use crate::basis::Basis;
 use crate::beam::Optics;
 use crate::beam::design::Design;
+use crate::grid::Grid;
 use crate::penalty::{Prior, Roughness};
 use crate::triangle::{Solution, Triangle};
-use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample};
+use crate::{Angular, BasisSpec, FitError, Penalty, Position, Region, Sample, undetermined};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Whitened rows and values of the readings that a choice is made from.
 pub(super) struct Family {
@@ -26,6 +28,8 @@ pub(super) struct Family {
     rows: Mat<f64>,
     values: Vec<f64>,
     u: Vec<f64>,
+    /// The readings' distinct coordinates.
+    grid: Arc<Grid>,
 }
 
 /// How a basis does.
@@ -61,7 +65,7 @@ impl Family {
     pub(super) fn new(
         spec: BasisSpec,
         region: &Region,
-        samples: &[Sample],
+        (samples, grid): (&[Sample], Arc<Grid>),
         u: &[f64],
         optics: Option<&Optics>,
     ) -> Result<Self, FitError> {
@@ -79,7 +83,7 @@ impl Family {
             }
         }
         let values = samples.iter().zip(u).map(|(s, u)| s.value / u).collect();
-        Ok(Self { spec, region: *region, rows, values, u: u.to_vec() })
+        Ok(Self { spec, region: *region, rows, values, u: u.to_vec(), grid })
     }
 
     /// Scores a basis of the family with the penalty that the data ask for; and the residuals over the
@@ -119,7 +123,8 @@ impl Family {
         if !is_held || basis.len() == 1 {
             let p = basis.len();
             let spectrum = solution.spectrum().ok_or(FitError::OutOfRange)?;
-            if n <= p || spectrum.rank() < p {
+            // Rows over beams may tell by rounding what the fit will refuse.
+            if n <= p || spectrum.rank() < p || undetermined::lacks(&self.grid, basis) {
                 return Ok(None);
             }
             let scale = (solution.residual_squares(0) / (n - p) as f64).max(strengths.scale_min);

@@ -7,6 +7,7 @@ use crate::beam::Optics;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
 use crate::{Angular, BasisSpec, Chart, Fine, FitError, Position, Region, Sample};
+use std::sync::Arc;
 
 /// Readings that a choice is made from at most.
 pub(super) fn readings_max(optics: Option<&Optics>) -> usize {
@@ -22,6 +23,8 @@ pub(super) struct Search<'s> {
     u: Vec<f64>,
     pub(super) strengths: Strengths,
     pub(super) folds: Vec<Vec<usize>>,
+    /// The samples' distinct coordinates.
+    grid: Arc<Grid>,
     /// Highest degree in position that places tell apart.
     position_most: usize,
     coefficients_max: usize,
@@ -52,6 +55,7 @@ impl<'s> Search<'s> {
             strengths: wish.strengths(scale_min),
             folds: sweeps.folds(FOLDS, one_by_one),
             position_most: distinct.saturating_sub(1),
+            grid: Arc::new(grid),
             coefficients_max: most.min(samples.len()),
             tried: Vec::new(),
         }
@@ -236,7 +240,8 @@ impl<'s> Search<'s> {
     }
 
     pub(super) fn family(&self, spec: BasisSpec) -> Result<Family, FitError> {
-        Family::new(spec, self.region, self.samples, &self.u, self.optics)
+        let samples = (self.samples, Arc::clone(&self.grid));
+        Family::new(spec, self.region, samples, &self.u, self.optics)
     }
 
     pub(super) fn best(&self, of: impl Fn(&BasisSpec) -> bool) -> Option<(BasisSpec, Trial)> {
