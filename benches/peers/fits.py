@@ -231,12 +231,16 @@ NAMES = {
 }
 
 
-WHY = (
-    "Why a peer is better where it is: on the lobes cos^n splines of the same kind as ours have the smoothing that the truth "
-    "calls best. On the gloss and on the lobe that moves, our choice counts all readings left out alike: splines with a patch, "
-    "which foretell the many of the flat parts better, outweigh functions that follow the lobe better. The batwing is as smooth "
-    "everywhere as a Gaussian process takes fields to be. The bright line the peers take as the spot blurs it; our rows know the beam."
-)
+# What is said of a scene where a peer has the smaller error.
+WHY = {
+    "batwing": "It is as smooth everywhere as a Gaussian process takes fields to be.",
+    "gap": "It is as smooth everywhere as a Gaussian process takes fields to be.",
+    "gloss": "The choice counts all readings left out alike: splines with a patch, which foretell the many of the flat parts "
+    "better, outweigh harmonics, which follow the lobe better.",
+    "cos400": "Splines of the same kind as ours, with the smoothing that the truth calls best.",
+    "cos2000": "Splines of the same kind as ours, with the smoothing that the truth calls best.",
+    "moving": "As on the gloss: splines with a patch outweigh polynomials on the disk, which follow the lobe better.",
+}
 
 
 def section(rows, date, beside):
@@ -251,10 +255,13 @@ def section(rows, date, beside):
         "| scene | readings | gonio, % | s | coefficients | best scipy spline, % | s | which | Gaussian process, % | s | smallest error |",
         "|---|--:|--:|--:|--:|--:|--:|---|--:|--:|---|",
     ]
+    why = []
     for scene, found in rows:
         best = min((name for name in splines if name in found), key=lambda name: found[name][0], default=None)
         process = found["gaussian_process"]
         winner = min(filter(None, ["gonio", best, "gaussian_process"]), key=lambda name: found[name][0])
+        if winner != "gonio":
+            why.append(f"- {SAID[scene['scene']]}: {WHY.get(scene['scene'], 'not looked into.')}")
         # Splines of one direction know no places; neighbours at one place are too flat for RBFs.
         of_splines = f"{100 * found[best][0]:.3f} | {found[best][1]:.2f} | {NAMES[best]}, {found[best][2]}" if best else "none | | "
         lines.append(
@@ -262,7 +269,7 @@ def section(rows, date, beside):
             f"| {of_splines} "
             f"| {100 * process[0]:.3f} | {process[1]:.1f} | {NAMES.get(winner, '**gonio**')} |"
         )
-    lines += ["", WHY, "", f"`benches/peers/fits.sh`  ", f"{date} · beside it: {beside}"]
+    lines += ["", *why, "", f"`benches/peers/fits.sh`  ", f"{date} · beside it: {beside}"]
     return "\n".join(lines)
 
 

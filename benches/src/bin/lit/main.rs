@@ -82,11 +82,11 @@ fn rig(has_edge: bool, has_beam: bool, tolerance: f64) -> Result<Arc<Compiled>, 
     Ok(Arc::new(compile(scene, nominal(), Simulated::default(), &terms)?))
 }
 
-/// Our answers: case, what it should be, tolerance, value, nanoseconds of a value once there was one, and of
-/// that first one, with all that is made ready for it.
+/// Our answers: case, what it should be, tolerance, value, nanoseconds of a value in a scene that is compiled,
+/// and of compiling it, with one value.
 fn answers() -> Result<String, Unmeasured> {
     use std::fmt::Write as _;
-    let mut text = "case,expected,tolerance,value,ns,first_ns\n".to_owned();
+    let mut text = "case,expected,tolerance,value,ns,compiled_ns\n".to_owned();
     let ray = Ray::new(POSE.0, POSE.1, POSE.2, POSE.3);
     let axis = Axis { spot: ray.point, direction: ray.direction };
     for (name, has_edge, has_beam) in [
@@ -104,11 +104,13 @@ fn answers() -> Result<String, Unmeasured> {
             let began = Instant::now();
             let rig = rig(has_edge, has_beam, tolerance)?;
             let value = rig.seen_radiance(&axis);
-            let first_ns = began.elapsed().as_secs_f64() * 1e9;
+            let compiled_ns = began.elapsed().as_secs_f64() * 1e9;
             let ns = call_ns(|| std::hint::black_box(rig.seen_radiance(&axis)));
             // Writing to a string does not fail.
-            let _ =
-                writeln!(text, "{name},{expected:e},{tolerance:e},{value:e},{ns:.2},{first_ns:.0}");
+            let _ = writeln!(
+                text,
+                "{name},{expected:e},{tolerance:e},{value:e},{ns:.2},{compiled_ns:.0}"
+            );
         }
     }
     Ok(text)
@@ -168,8 +170,8 @@ struct Answer {
     effort: String,
     error: f64,
     seconds: f64,
-    /// Of the first value; none of Mitsuba's.
-    first_seconds: Option<f64>,
+    /// On the clock, of compiling the scene with one value; none of Mitsuba's.
+    compiled_seconds: Option<f64>,
 }
 
 fn section(path: &std::path::Path) -> Result<Section, Unmeasured> {
@@ -177,13 +179,13 @@ fn section(path: &std::path::Path) -> Result<Section, Unmeasured> {
     let mut all = Vec::new();
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
-        let [case, solver, effort, _, error, seconds, first] = cells[..] else {
+        let [case, solver, effort, _, error, seconds, compiled] = cells[..] else {
             return Err(Unmeasured::because(format!("`{line}` has not seven columns")));
         };
         let [case, solver, effort] = [case, solver, effort].map(ToString::to_string);
         let (error, seconds) = (error.parse()?, seconds.parse()?);
-        let first_seconds = if first.is_empty() { None } else { Some(first.parse()?) };
-        all.push(Answer { case, solver, effort, error, seconds, first_seconds });
+        let compiled_seconds = if compiled.is_empty() { None } else { Some(compiled.parse()?) };
+        all.push(Answer { case, solver, effort, error, seconds, compiled_seconds });
     }
     let mut section = Section::new("lit", "A lit patch and a penumbra, beside Mitsuba");
     section.say(
@@ -191,9 +193,9 @@ fn section(path: &std::path::Path) -> Result<Section, Unmeasured> {
          detector sees it along its axis and over its whole beam; one core, one run of \
          `benches/peers/lit.sh`, processor time a value, warm. Mitsuba 3.9.1 (`llvm_ad_rgb`, its \
          `path` integrator for direct light, all rays of a value in one kernel); its error is the \
-         root mean square over 8 seeds. Ours: at tolerances of 1e-1 to 1e-5; over a beam a value is \
-         read from a table of the patch, which the first value makes: its time, with reading and \
-         weighing the scene, is the last column. Mitsuba solves the \
+         root mean square over 8 seeds. Ours: at tolerances of 1e-1 to 1e-5, in a scene that is \
+         compiled: its effects are weighed, and over a beam the patch is read from a table made then. \
+         What that takes once, with one value, on the clock, is the last column. Mitsuba solves the \
          more general problem: any shapes, any materials, textures, spectra and many bounces, and \
          many pixels at once, where the start of a kernel (most of its time at few samples) counts \
          once.",
@@ -204,25 +206,28 @@ fn section(path: &std::path::Path) -> Result<Section, Unmeasured> {
         "effort",
         "relative error",
         "time a value, µs",
-        "the first one, µs",
+        "compiling, µs",
     ]);
-    let mut least = f64::INFINITY;
+    let (mut least, mut quicker) = (f64::INFINITY, 0);
     for answer in &all {
-        let Answer { case, solver, effort, error, seconds, first_seconds } = answer;
+        let Answer { case, solver, effort, error, seconds, compiled_seconds } = answer;
         let time = format!("{:.2}", seconds * 1e6);
-        let first = first_seconds.map_or_else(String::new, |first| format!("{:.0}", first * 1e6));
-        shown.row([case, solver, effort, &format!("{error:.1e}"), &time, &first]);
+        let compiling = compiled_seconds.map_or_else(String::new, |s| format!("{:.0}", s * 1e6));
+        shown.row([case, solver, effort, &format!("{error:.1e}"), &time, &compiling]);
         if solver == "Mitsuba 3" {
             let ours = all.iter().filter(|other| {
                 other.solver != *solver && other.case == *case && other.error <= *error
             });
-            let quickest = ours.map(|other| other.seconds).fold(f64::INFINITY, f64::min);
+            let quickest = ours.clone().map(|other| other.seconds).fold(f64::INFINITY, f64::min);
             least = least.min(seconds / quickest);
+            let compiled = ours.filter_map(|other| other.compiled_seconds);
+            quicker += usize::from(*seconds < compiled.fold(f64::INFINITY, f64::min));
         }
     }
     section.show(&shown);
     section.say(&format!(
-        "At equal error, the least ratio of times over all of Mitsuba's rows: {least:.1}."
+        "At equal error, the least ratio of times over all of Mitsuba's rows: {least:.1}. One value \
+         alone, compiling counted, takes longer than Mitsuba's warm one in {quicker} of its rows."
     ));
     section.aim("at equal error ten times faster than Mitsuba", least >= 10.0);
     Ok(section)
