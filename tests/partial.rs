@@ -94,6 +94,39 @@ fn a_long_file_is_fitted_in_blocks_as_it_is_as_a_share() {
     }
 }
 
+#[test]
+fn a_merge_states_its_gaps_and_what_its_functions_miss() {
+    let bench = Bench::empty();
+    let all = samples(0, 3_000, true);
+    let mut lines = all.lines();
+    let head = lines.next().unwrap();
+    // With a ridge round the normal, and without an eighth of the azimuths.
+    let ridged = |line: &str| {
+        let mut numbers: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+        numbers[4] += 5.0 * (-((numbers[2] - 40.0) / 20.0).powi(2)).exp();
+        let fields: Vec<String> = numbers.iter().map(f64::to_string).collect();
+        (!(30.0..75.0).contains(&numbers[3])).then(|| fields.join(","))
+    };
+    let lines: Vec<String> = lines.filter_map(ridged).collect();
+    let write = |name: &str, lines: &[String]| {
+        std::fs::write(bench.path(name), format!("{head}\n{}\n", lines.join("\n"))).unwrap();
+    };
+    write("all.csv", &lines);
+    let mut merge = vec!["fit", "--merge", "--json"];
+    let shares = ["0", "1", "2"].map(|name| {
+        let third = lines.chunks(lines.len().div_ceil(3)).nth(name.parse().unwrap()).unwrap();
+        write(&format!("{name}.csv"), third);
+        part(&bench, name)
+    });
+    merge.extend(shares.iter().map(String::as_str));
+    let merged = bench.gonio(&merge).well().json();
+    let whole = [&["fit", "all.csv", "--json", "--position-degree=0"], &REGION[..4]].concat();
+    let whole = bench.gonio(&whole).well().json();
+    assert_knows_as_much(&merged, &whole, 1e-2);
+    assert!(merged["truncation_gain"].as_f64().unwrap() > 12.0);
+    assert!(merged["exitance_w_per_m2"]["measured_fraction"].as_f64().unwrap() < 0.9);
+}
+
 /// The same with every thirtieth sample far off, and all above 59.5 saturated there.
 fn spoilt(count: u32) -> String {
     let mut lines = samples(0, count, true).lines().map(str::to_owned).collect::<Vec<_>>();
@@ -290,6 +323,24 @@ fn a_run_is_a_share_too() {
         for key in ["coefficients", "covariance", "n_used", "dof", "n_flagged", "n_excluded"] {
             assert_close(&merged[key], &whole[key], 1e-6);
         }
+        assert_knows_as_much(&merged, &whole, 1e-3);
+    }
+}
+
+/// What was not looked for, what was not measured, and what the functions can't follow.
+fn assert_knows_as_much(merged: &Value, whole: &Value, tolerance: f64) {
+    let (resolves, expected) = (&merged["resolves"], &whole["resolves"]);
+    assert_close(&resolves["measured_to_deg"], &expected["measured_to_deg"], 1e-9);
+    for key in ["theta_deg", "phi_deg", "x_mm", "y_mm"] {
+        assert_eq!(resolves[key]["limit"], expected[key]["limit"], "{key}");
+        if !expected[key].is_null() {
+            assert_close(&resolves[key]["width"], &expected[key]["width"], 3e-3);
+        }
+    }
+    assert_eq!(merged["truncation_gain"].is_null(), whole["truncation_gain"].is_null());
+    let (exitance, expected) = (&merged["exitance_w_per_m2"], &whole["exitance_w_per_m2"]);
+    for key in ["u", "u_independent", "measured_fraction"] {
+        assert_close(&exitance[key], &expected[key], tolerance);
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::basis::Basis;
 use crate::coverage::Coverage;
+use crate::stored::{Numbers, put_all, whole};
 use crate::{Cause, Chart, Ray, Region, Sample, Symmetry};
 use std::collections::BTreeSet;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -27,7 +28,7 @@ struct Map {
 
 /// Where samples of any number lie, taken in block by block in bounded memory: a direction is known by
 /// its cell.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Looked {
     places: BTreeSet<(i64, i64)>,
     width_rad: f64,
@@ -41,20 +42,53 @@ impl Looked {
     /// Takes samples of finite directions in.
     pub(crate) fn take(&mut self, samples: &[Sample]) {
         for Sample { ray, .. } in samples {
-            self.places.insert(place((ray.theta_rad, ray.phi_rad), self.width_rad));
-            if self.places.len() > PLACES_MAX {
-                let finer = std::mem::take(&mut self.places);
-                let angles = finer.into_iter().map(|at| angles(at, self.width_rad));
-                let wider_rad = 2.0 * self.width_rad;
-                self.places = angles.map(|at| place(at, wider_rad)).collect();
-                self.width_rad = wider_rad;
-            }
+            self.note((ray.theta_rad, ray.phi_rad));
         }
     }
 
-    pub(crate) fn measured(self) -> Measured {
-        let directions = self.places.into_iter().map(|at| angles(at, self.width_rad));
-        Measured::of_directions(directions.collect())
+    /// Takes in what another one holds.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        while self.width_rad < other.width_rad {
+            self.widen();
+        }
+        other.directions().for_each(|direction| self.note(direction));
+    }
+
+    /// The middles of its cells, (θ, φ).
+    pub(crate) fn directions(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.places.iter().map(|at| angles(*at, self.width_rad))
+    }
+
+    pub(crate) fn measured(&self) -> Measured {
+        Measured::of_directions(self.directions().collect())
+    }
+
+    fn note(&mut self, direction: (f64, f64)) {
+        self.places.insert(place(direction, self.width_rad));
+        if self.places.len() > PLACES_MAX {
+            self.widen();
+        }
+    }
+
+    fn widen(&mut self) {
+        let angles: Vec<(f64, f64)> = self.directions().collect();
+        self.width_rad *= 2.0;
+        self.places = angles.into_iter().map(|at| place(at, self.width_rad)).collect();
+    }
+}
+
+impl Looked {
+    /// Adds the numbers that it consists of.
+    pub(crate) fn put(&self, out: &mut Vec<f64>) {
+        out.push(self.width_rad);
+        put_all(out, self.places.iter().map(|&(theta, phi)| [theta as f64, phi as f64]));
+    }
+
+    /// Takes them up again.
+    pub(crate) fn stored(numbers: &mut Numbers<'_>) -> Option<Self> {
+        let width_rad = numbers.number().filter(|width| (PLACE_RAD..1.0).contains(width))?;
+        let places = numbers.all(PLACES_MAX, |[theta, phi]| Some((whole(theta)?, whole(phi)?)))?;
+        Some(Self { places, width_rad })
     }
 }
 

@@ -13,10 +13,11 @@ use crate::choice::Tally;
 use crate::grid::{
     ANGLE_APART_RAD, Grid, azimuth_line, off_pole_rad, pole_distance_rad, position_apart_m,
 };
-use crate::{Ray, Region, Sample};
+use crate::stored::{Numbers, put_all, whole};
+use crate::{Region, Sample};
 
 /// Poses that are forgotten one by one.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Poses {
     region: Region,
     /// Of so many readings the direction of one is compared with the probes.
@@ -28,25 +29,25 @@ pub(crate) struct Poses {
     theta_rad: Cells,
     lines_rad: Cells,
     azimuths_rad: Cells,
-    /// Directions over the cone, and the cosine of the angle to the nearest reading.
+    /// Directions over the cone, and the cosine of the angle to the nearest reading; none of poses that are
+    /// to be probed later.
     probes: Vec<(DVec3, f64)>,
 }
 
 impl Poses {
     /// Of so many readings of a region.
     pub(crate) fn new(readings: usize, region: &Region) -> Self {
+        let every = readings.div_ceil(DIRECTIONS_MAX).max(1);
+        Self { every, probes: probes(region), ..Self::unprobed(region) }
+    }
+
+    /// Of nobody knows how many readings, whose directions are kept elsewhere.
+    pub(crate) fn unprobed(region: &Region) -> Self {
         let position = || Cells::new(position_apart_m(region));
         let angle = || Cells::new(ANGLE_APART_RAD);
-        let cos_min = libm::cos(region.theta_max_rad);
-        let probe = |i: u32| {
-            // Evenly in solid angle, turned on by the golden angle.
-            let t = (f64::from(i) + 0.5) / f64::from(PROBES);
-            let theta = libm::acos(1.0 - t * (1.0 - cos_min));
-            (radiometry::direction::unit(theta, f64::from(i) * GOLDEN_RAD), -1.0)
-        };
         Self {
             region: *region,
-            every: readings.div_ceil(DIRECTIONS_MAX).max(1),
+            every: 1,
             seen: 0,
             measured_to_rad: 0.0,
             x_m: position(),
@@ -54,8 +55,60 @@ impl Poses {
             theta_rad: angle(),
             lines_rad: angle(),
             azimuths_rad: angle(),
-            probes: (0..PROBES).map(probe).collect(),
+            probes: Vec::new(),
         }
+    }
+
+    /// The same with all of its directions, (θ, φ), once it is known which these are.
+    #[must_use]
+    pub(crate) fn probed(&self, directions: impl Iterator<Item = (f64, f64)>) -> Self {
+        let mut probed = Self { probes: probes(&self.region), ..self.clone() };
+        directions.for_each(|(theta_rad, phi_rad)| probed.probe(theta_rad, phi_rad));
+        probed
+    }
+
+    /// Takes in what another one of the same region holds, but for its probes.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.seen += other.seen;
+        self.measured_to_rad = self.measured_to_rad.max(other.measured_to_rad);
+        for (own, other) in self.cells_mut().into_iter().zip(other.cells()) {
+            own.merge(other);
+        }
+    }
+
+    fn cells(&self) -> [&Cells; 5] {
+        [&self.x_m, &self.y_m, &self.theta_rad, &self.lines_rad, &self.azimuths_rad]
+    }
+
+    fn cells_mut(&mut self) -> [&mut Cells; 5] {
+        let Self { x_m, y_m, theta_rad, lines_rad, azimuths_rad, .. } = self;
+        [x_m, y_m, theta_rad, lines_rad, azimuths_rad]
+    }
+
+    /// Adds the numbers that it consists of, but for its probes.
+    pub(crate) fn put(&self, out: &mut Vec<f64>) {
+        out.extend([self.seen as f64, self.measured_to_rad]);
+        for cells in self.cells() {
+            put_all(out, cells.cells.values().map(|cell| [cell.lowest, cell.highest, cell.off]));
+        }
+    }
+
+    /// Takes them up again.
+    pub(crate) fn stored(numbers: &mut Numbers<'_>, region: &Region) -> Option<Self> {
+        let mut poses = Self::unprobed(region);
+        poses.seen = numbers.count(usize::MAX)?;
+        poses.measured_to_rad = numbers.number()?;
+        for cells in poses.cells_mut() {
+            let width = cells.width;
+            let cell = |[lowest, highest, off]: [f64; 3]| {
+                let cell = Cell { lowest, highest, off };
+                let place = place(lowest, width)?;
+                (place == self::place(highest, width)? && lowest <= highest)
+                    .then_some((place, cell))
+            };
+            cells.cells = numbers.all(CELLS_MAX, cell)?;
+        }
+        Some(poses)
     }
 
     /// Of samples that are there.
@@ -76,14 +129,14 @@ impl Poses {
             self.lines_rad.take(azimuth_line(ray.phi_rad), off);
             self.azimuths_rad.take(ray.phi_rad.rem_euclid(TAU), off);
             if self.seen.is_multiple_of(self.every) {
-                self.probe(ray);
+                self.probe(ray.theta_rad, ray.phi_rad);
             }
             self.seen += 1;
         }
     }
 
-    fn probe(&mut self, ray: &Ray) {
-        let seen = radiometry::direction::unit(ray.theta_rad, ray.phi_rad);
+    fn probe(&mut self, theta_rad: f64, phi_rad: f64) {
+        let seen = radiometry::direction::unit(theta_rad, phi_rad);
         for (probe, nearest) in &mut self.probes {
             *nearest = nearest.max(seen.dot(*probe));
         }
@@ -133,15 +186,27 @@ impl Poses {
     }
 }
 
+/// Directions evenly over the cone, to which no reading is near yet.
+fn probes(region: &Region) -> Vec<(DVec3, f64)> {
+    let cos_min = libm::cos(region.theta_max_rad);
+    let probe = |i: u32| {
+        // Evenly in solid angle, turned on by the golden angle.
+        let t = (f64::from(i) + 0.5) / f64::from(PROBES);
+        let theta = libm::acos(1.0 - t * (1.0 - cos_min));
+        (radiometry::direction::unit(theta, f64::from(i) * GOLDEN_RAD), -1.0)
+    };
+    (0..PROBES).map(probe).collect()
+}
+
 /// Numbers in cells.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 struct Cells {
     width: f64,
     cells: BTreeMap<i64, Cell>,
 }
 
 /// Numbers that lie close together.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Cell {
     lowest: f64,
     highest: f64,
@@ -154,13 +219,22 @@ impl Cells {
         Self { width: apart / CELLS_APART, cells: BTreeMap::new() }
     }
 
-    #[allow(clippy::cast_possible_truncation)] // angles, and positions within a region
     fn take(&mut self, value: f64, off: f64) {
-        let place = libm::floor(value / self.width) as i64;
-        let cell = self.cells.entry(place).or_insert(Cell { lowest: value, highest: value, off });
-        cell.lowest = cell.lowest.min(value);
-        cell.highest = cell.highest.max(value);
-        cell.off = cell.off.max(off);
+        // Angles, and positions within a region: none is out of range.
+        if let Some(place) = place(value, self.width) {
+            self.put(place, Cell { lowest: value, highest: value, off });
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        other.cells.iter().for_each(|(place, cell)| self.put(*place, *cell));
+    }
+
+    fn put(&mut self, place: i64, other: Cell) {
+        let cell = self.cells.entry(place).or_insert(other);
+        cell.lowest = cell.lowest.min(other.lowest);
+        cell.highest = cell.highest.max(other.highest);
+        cell.off = cell.off.max(other.off);
     }
 
     /// The ends of cells that reach farther than this from the poles, rising.
@@ -170,8 +244,15 @@ impl Cells {
     }
 }
 
+/// The cell of a number; `None` where cells can't be told apart any more.
+fn place(value: f64, width: f64) -> Option<i64> {
+    whole(libm::floor(value / width))
+}
+
 /// Cells in what counts as apart.
 const CELLS_APART: f64 = 16.0;
+/// Stored cells of a coordinate at most: there are 100,000 in a turn, and some 8,000 across a region.
+const CELLS_MAX: usize = 1 << 18;
 /// Probes of a hole.
 const PROBES: u32 = 400;
 /// Of more readings every so many-th is compared with them.

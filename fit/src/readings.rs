@@ -51,6 +51,17 @@ pub struct Weighed {
 }
 
 impl Weighed {
+    /// Of so many samples that all say what they read.
+    pub(crate) fn alike(samples: usize) -> Self {
+        Self {
+            robust: Robust::None,
+            weights: vec![1.0; samples],
+            residuals: Vec::new(),
+            limits: Vec::new(),
+            nuisances: Vec::new(),
+        }
+    }
+
     /// Whether a sample lost nearly all of its weight for its residual: it has no say in what
     /// functions the others ask for.
     pub(crate) fn is_outlier(&self, sample: usize) -> bool {

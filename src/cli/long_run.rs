@@ -97,7 +97,7 @@ pub(super) fn share(
         model,
         robust: Robust::None,
         optics: optics.as_ref(),
-        with_truncation: false,
+        with_truncation: true,
         others: &[],
     };
     let block = RefCell::<Block>::default();

@@ -175,7 +175,8 @@ impl Share<'_> {
     fn take(&mut self, block: &InputSamples) -> Result<(), String> {
         if self.begun.is_none() {
             let weighting = if block.has_u() { Weighting::Stated } else { Weighting::Alike };
-            let begun = Accumulator::new(self.region, self.model, self.optics.copied(), weighting);
+            let begun = Accumulator::new(self.region, self.model, self.optics.copied(), weighting)
+                .and_then(Accumulator::with_truncation);
             self.begun = Some((begun.map_err(|error| error.to_string())?, block.quantity));
         }
         let Some((accumulator, _)) = &mut self.begun else { return Ok(()) };
@@ -214,6 +215,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
     if rays.is_some() {
         args.chart.demand_of(&first.partial.parts().region)?;
     }
+    let resolves = whole.resolves(first.optics.as_ref());
     let closed = whole
         .close(args.u_relative)
         .map_err(|error| Failure::with_help(format!("merged: {error}"), FIT_HELP))?;
@@ -239,7 +241,7 @@ pub(super) fn merge(args: &FitArgs, rays: Option<Vec<ListedRay>>, wanted: &[Want
         fit: &ruled.fit,
         treatment: &treatment,
         choice: None,
-        resolves: None,
+        resolves: Some(resolves),
         quantity: first.quantity,
         simulated,
         n_flagged: usize::try_from(n_flagged).unwrap_or(usize::MAX),

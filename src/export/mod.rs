@@ -21,6 +21,7 @@ mod input_blocks;
 mod monte_carlo;
 mod number;
 mod partial_file;
+mod partial_header;
 mod ray_chart;
 mod readings;
 mod repeats;

@@ -1,8 +1,9 @@
 //! Partial fits as files: back as they were, and refused when they are not.
 
 use super::*;
-use fit::partial::Accumulator;
-use fit::{Noise, Ray, Sample};
+use fit::partial::{Accumulator, Weighting};
+use fit::{BasisSpec, Noise, Outline, Ray, Region, Sample};
+use radiometry::beam::Beam;
 
 const BASIS: BasisSpec = BasisSpec::zernike(2, 0);
 
@@ -17,7 +18,8 @@ fn file(region_deg: f64, readings: u32) -> PartialFile {
     let sample = |i: u32| Sample { ray: ray(i), value: 50.0 + 0.1 * f64::from(i % 3), noise };
     let theta_max_rad = region_deg.to_radians();
     let region = Region::surface((0.0, 0.0), (0.0, 0.0), theta_max_rad);
-    let mut share = Accumulator::new(region, BASIS, None, Weighting::Stated).unwrap();
+    let share = Accumulator::new(region, BASIS, None, Weighting::Stated).unwrap();
+    let mut share = share.with_truncation().unwrap();
     share.absorb(&(0..readings).map(sample).collect::<Vec<_>>()).unwrap();
     PartialFile {
         partial: share.finish(),
@@ -41,17 +43,33 @@ fn a_file_comes_back_to_the_last_bit() {
         let file = file(80.0, readings);
         let read = ReadPartial::read(&bytes(&file)).unwrap();
         assert_eq!(read.partial.parts(), file.partial.parts());
+        assert!(file.partial.parts().finer.is_some());
         assert_eq!((read.quantity, read.n_flagged, read.n_excluded), (Quantity::Luminance, 3, 2));
+    }
+}
+
+#[test]
+fn the_beam_comes_back_with_the_sample_s_outline() {
+    let beam = Beam::of_tube(0.006, 0.002, 0.28, 0.01).unwrap();
+    let outlines = [
+        None,
+        Some(Outline::Rectangle { x_m: (-0.02, 0.03), y_m: (-0.01, 0.01) }),
+        Some(Outline::Disk { centre_m: (0.001, 0.0), radius_m: 0.02 }),
+    ];
+    for outline in outlines {
+        let optics = Some(Optics { beam, outline });
+        let file = PartialFile { optics, ..file(80.0, 40) };
+        assert_eq!(ReadPartial::read(&bytes(&file)).unwrap().optics, optics);
     }
 }
 
 #[test]
 fn no_file_that_was_cut_or_changed_is_taken() {
     let whole = bytes(&file(80.0, 40));
-    for length in 0..whole.len() {
+    for length in (0..2000).chain((2000..whole.len()).step_by(97)) {
         assert!(ReadPartial::read(&whole[..length]).is_err(), "{length} bytes");
     }
-    for at in 0..whole.len() {
+    for at in (0..2000).chain((2000..whole.len()).step_by(97)) {
         let mut changed = whole.clone();
         changed[at] ^= 0x10;
         assert!(ReadPartial::read(&changed).is_err(), "byte {at}");
@@ -62,8 +80,8 @@ fn no_file_that_was_cut_or_changed_is_taken() {
     flipped[whole.len() - 20] ^= 1;
     assert!(said(&flipped).contains("corrupt"));
     let mut newer = whole.clone();
-    newer[8] = 2;
-    assert_eq!(said(&newer), "version 2 of partial fits; expected 1");
+    newer[8] = 3;
+    assert_eq!(said(&newer), "version 3 of partial fits; expected 2");
     assert!(said(&whole[..whole.len() - 3]).contains("cut short"));
     assert!(said(&[&whole[..], &[0; 8]].concat()).contains("not all of it"));
 }

@@ -21,7 +21,8 @@ impl Fitting<'_> {
         if !self.asked.with_truncation {
             return Ok(None);
         }
-        let Some(finer) = Finer::of(fit, poses.places()) else { return Ok(None) };
+        let finer = Finer::of(fit.basis(), fit.region(), poses.places());
+        let Some(finer) = finer else { return Ok(None) };
         let taken = Taken {
             nuisances: shared.nuisances.len(),
             holds_constant: shared.holds_constant,

@@ -9,6 +9,7 @@
 mod evidence;
 mod family;
 mod gleaning;
+mod loose;
 mod refining;
 mod search;
 mod sweeps;
@@ -25,6 +26,7 @@ use family::Trial;
 use search::Search;
 
 pub use gleaning::Gleaning;
+pub(crate) use loose::Loose;
 pub use sweeps::SweepKind;
 pub(crate) use sweeps::Sweeps;
 pub(crate) use tally::Tally;

@@ -10,6 +10,7 @@ use super::gleaning::hash;
 use super::sweeps::{KINDS, SweepKind, are_sweeps};
 use crate::Sample;
 use crate::grid::Grid;
+use crate::stored::{Numbers, put_all, whole};
 
 /// Counts of readings by what those of a sweep share.
 #[derive(Debug)]
@@ -19,8 +20,9 @@ pub(crate) struct Tally {
     kinds: [Counts; KINDS.len()],
 }
 
-#[derive(Debug, Default)]
-struct Counts {
+/// How many readings share a key.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Counts {
     /// Of 2^this keys one is counted.
     halvings: u32,
     counts: BTreeMap<[i64; 3], usize>,
@@ -36,7 +38,7 @@ impl Tally {
         for sample in samples {
             let ray = self.grid.snap(&sample.ray);
             for ((_, key), counts) in KINDS.iter().zip(&mut self.kinds) {
-                counts.take(key(&ray));
+                counts.take(key(&ray), 1);
             }
         }
     }
@@ -49,16 +51,58 @@ impl Tally {
 }
 
 impl Counts {
-    fn take(&mut self, key: [i64; 3]) {
+    /// Counts so many readings of a key.
+    pub(super) fn take(&mut self, key: [i64; 3], readings: usize) {
         if hash(&key).trailing_zeros() < self.halvings {
             return;
         }
-        *self.counts.entry(key).or_default() += 1;
+        *self.counts.entry(key).or_default() += readings;
         while self.counts.len() > KEYS_MAX {
-            self.halvings += 1;
-            let halvings = self.halvings;
-            self.counts.retain(|key, _| hash(key).trailing_zeros() >= halvings);
+            self.halve(self.halvings + 1);
         }
+    }
+
+    /// Takes in what another one counted.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.halve(self.halvings.max(other.halvings));
+        other.counts.iter().for_each(|(key, readings)| self.take(*key, *readings));
+    }
+
+    /// By other keys, which several of these may share.
+    pub(super) fn renamed(
+        &self,
+        name: impl Fn(&[i64; 3]) -> [i64; 3],
+    ) -> BTreeMap<[i64; 3], usize> {
+        let mut renamed = BTreeMap::new();
+        for (key, readings) in &self.counts {
+            *renamed.entry(name(key)).or_default() += readings;
+        }
+        renamed
+    }
+
+    fn halve(&mut self, halvings: u32) {
+        self.halvings = halvings;
+        self.counts.retain(|key, _| hash(key).trailing_zeros() >= halvings);
+    }
+
+    /// Adds the numbers that it consists of.
+    pub(super) fn put(&self, out: &mut Vec<f64>) {
+        out.push(f64::from(self.halvings));
+        let entry = |(key, readings): (&[i64; 3], &usize)| {
+            let [a, b, c] = key.map(|part| part as f64);
+            [a, b, c, *readings as f64]
+        };
+        put_all(out, self.counts.iter().map(entry));
+    }
+
+    /// Takes them up again.
+    pub(super) fn stored(numbers: &mut Numbers<'_>) -> Option<Self> {
+        let halvings = u32::try_from(numbers.count(64)?).ok()?;
+        let counts = numbers.all(KEYS_MAX, |[a, b, c, readings]| {
+            let readings = usize::try_from(whole(readings)?).ok()?;
+            Some(([whole(a)?, whole(b)?, whole(c)?], readings))
+        });
+        Some(Self { halvings, counts: counts? })
     }
 }
 

@@ -6,7 +6,9 @@ use crate::parts::{CommonShift, Parts, Quality};
 use crate::penalty::{Penalised, Prior};
 use crate::solve::left_over;
 use crate::triangle::Solution;
+use crate::truncation::Remembered;
 use crate::undetermined::by_functions;
+use crate::whereabouts::Whereabouts;
 use crate::{Fit, FitError};
 
 /// The fit of all shares.
@@ -39,7 +41,7 @@ impl Partial {
 
     /// As [`fit`](Self::fit), with what was done to the stated uncertainties.
     pub fn close(self, u_relative: Option<f64>) -> Result<Closed, FitError> {
-        let Self { basis, penalty, weighting, common, sums, triangle } = self;
+        let Self { basis, penalty, weighting, common, sums, triangle, whereabouts, finer } = self;
         let prior = Prior::new(&basis, penalty)?;
         let n_used = usize::try_from(sums.readings).unwrap_or(usize::MAX);
         check(n_used, basis.len(), &prior)?;
@@ -83,12 +85,33 @@ impl Partial {
             };
             let shifts = shifts(&solution, common);
             let (region, model) = (*basis.region(), Penalised::new(basis.spec(), penalty));
-            // The readings are forgotten: nothing can be held against finer functions.
             let truncation = None;
             let parts = Parts { region, model, coefficients, factor, shifts, quality, truncation };
             let fit = Fit::from_parts(parts).map_err(|_| FitError::OutOfRange)?;
-            return Ok(Closed { fit, u_factor: scatter.u_factor });
+            let closed = Closed { fit, u_factor: scatter.u_factor };
+            let noise = (stated.unwrap_or(unit), stated.is_none());
+            return closed.widened(finer, &whereabouts, noise);
         }
+    }
+}
+
+impl Closed {
+    /// With where nothing was measured, and what the functions can't follow in u. Then it is by these that
+    /// readings scatter beyond what they state, as far as they explain it.
+    fn widened(
+        self,
+        finer: Option<Remembered>,
+        whereabouts: &Whereabouts,
+        noise: (f64, bool),
+    ) -> Result<Self, FitError> {
+        let Self { mut fit, mut u_factor } = self;
+        if let Some(finer) = finer
+            && let Some(widened) = finer.widened(&fit, whereabouts.places(), noise, u_factor)?
+        {
+            u_factor = if noise.1 { 1.0 } else { widened.scale().sqrt().max(1.0) };
+            fit = Fit::from_parts(widened.parts).map_err(|_| FitError::OutOfRange)?;
+        }
+        Ok(Self { fit: fit.with_measured(Some(whereabouts.measured())), u_factor })
     }
 }
 

@@ -5,7 +5,10 @@
 //! the merge of partial fits equals the one of all readings to rounding, in whatever shares and order.
 //! What can be told only from all readings together is done at the end, on the triangle: where
 //! nothing is known of the noise, or the residuals scatter beyond it, the residuals' size scales
-//! every u alike. It knows no file: [`Parts`] are the numbers to be stored.
+//! every u alike. A share remembers where its readings lie, so that the merge knows its gaps and the narrowest
+//! feature that it can show; and where that is asked for ([`Accumulator::with_truncation`]), what
+//! they say of finer functions, so that u holds what the fit's own can't follow. It knows no file: [`Parts`] are the
+//! numbers to be stored.
 //!
 //! ```
 //! use fit::partial::{Accumulator, Weighting};
@@ -31,17 +34,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub use accumulator::Accumulator;
 pub use closing::Closed;
 
 use std::fmt;
 
 use crate::basis::Basis;
 use crate::beam::Optics;
-use crate::beam::design::Design;
-use crate::check::check_sample;
 use crate::triangle::Triangle;
-use crate::{BasisSpec, FitError, Noise, Penalised, Penalty, Region, Sample};
+use crate::truncation::Remembered;
+use crate::whereabouts::Whereabouts;
+use crate::{BasisSpec, FitError, Penalty, Region, Resolves};
 
+mod accumulator;
 mod closing;
 
 /// What the rows of a share are weighted by.
@@ -62,6 +67,8 @@ pub struct Partial {
     common: Vec<String>,
     sums: Sums,
     triangle: Triangle,
+    whereabouts: Whereabouts,
+    finer: Option<Remembered>,
 }
 
 /// What is summed beside the triangle.
@@ -94,6 +101,19 @@ pub struct Parts {
     pub sums: Sums,
     /// The upper triangle of functions, values and common components, packed by columns.
     pub triangle: Vec<f64>,
+    /// Where its readings lie; what each number says this crate alone knows.
+    pub whereabouts: Vec<f64>,
+    /// What they say of functions that the fit doesn't have, where that was asked for.
+    pub finer: Option<FinerParts>,
+}
+
+/// The numbers of what a share says of finer functions, in the order that this crate alone knows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FinerParts {
+    /// The common components that show in residuals.
+    pub common: Vec<String>,
+    /// Triangle, sums, and mean rows by direction.
+    pub numbers: Vec<f64>,
 }
 
 /// Why partial fits can't be merged, or a share not be taken in.
@@ -145,75 +165,17 @@ impl fmt::Display for PartialError {
 
 impl std::error::Error for PartialError {}
 
-/// Takes readings in, in blocks of any size, and forgets them.
-#[derive(Debug)]
-pub struct Accumulator {
-    partial: Partial,
-    optics: Option<Optics>,
-}
-
-impl Accumulator {
-    /// Nothing yet, of a field over a region in a basis.
-    pub fn new(
-        region: Region,
-        model: impl Into<Penalised>,
-        optics: Option<Optics>,
-        weighting: Weighting,
-    ) -> Result<Self, FitError> {
-        let Penalised { basis, penalty, .. } = model.into();
-        let basis = basis_over(basis, penalty, region)?;
-        let triangle = Triangle::new(basis.len(), 1);
-        let (common, sums) = (Vec::new(), Sums::NONE);
-        Ok(Self { partial: Partial { basis, penalty, weighting, common, sums, triangle }, optics })
-    }
-
-    /// Takes a block in. An error leaves everything as it was before the block. Where there is a
-    /// beam, the rows are as exact as a fit of ten million readings needs them.
-    pub fn absorb(&mut self, samples: &[Sample]) -> Result<(), PartialError> {
-        let Partial { basis, weighting, sums, triangle, .. } = &mut self.partial;
-        for (index, sample) in samples.iter().enumerate() {
-            check_sample(index, sample, basis.region())?;
-            if *weighting == Weighting::Stated && !matches!(sample.noise, Noise::Fixed { .. }) {
-                return Err(PartialError::Noise { index });
-            }
-        }
-        let optics = self.optics.as_ref();
-        let design = Design::of_a_share(samples, basis, optics, READINGS_FORESEEN)?;
-        let mut room = design.room();
-        let mut row = vec![0.0; basis.len() + 1];
-        for (i, sample) in samples.iter().enumerate() {
-            let variance = match sample.noise {
-                Noise::Fixed { variance } if *weighting == Weighting::Stated => variance,
-                _ => 1.0,
-            };
-            design.row(i, &mut room, &mut row[..basis.len()]);
-            row[basis.len()] = sample.value;
-            let weight = 1.0 / variance.sqrt();
-            for value in &mut row {
-                *value *= weight;
-            }
-            triangle.absorb(&row);
-            sums.note(sample.value, variance);
-        }
-        Ok(())
-    }
-
-    /// Ends the share.
-    pub fn finish(self) -> Partial {
-        self.partial
-    }
-}
-
 impl Partial {
     /// Of rows that its own fit weighted, the common components their sides.
     pub(crate) fn weighted(
-        basis: Basis,
-        penalty: Penalty,
+        (basis, penalty): (Basis, Penalty),
         common: Vec<String>,
-        sums: Sums,
-        triangle: Triangle,
+        (sums, triangle): (Sums, Triangle),
+        whereabouts: Whereabouts,
+        finer: Option<Remembered>,
     ) -> Self {
-        Self { basis, penalty, weighting: Weighting::Stated, common, sums, triangle }
+        let weighting = Weighting::Stated;
+        Self { basis, penalty, weighting, common, sums, triangle, whereabouts, finer }
     }
 
     /// Takes up stored parts.
@@ -228,7 +190,19 @@ impl Partial {
         if !parts.sums.is_sound() {
             return Err(FitError::Parts { what: "sums", expected: 4, found: 0 });
         }
+        let malformed = |what| FitError::Parts { what, expected: 1, found: 0 };
+        let whereabouts = Whereabouts::stored(&parts.whereabouts, &parts.region)
+            .ok_or_else(|| malformed("whereabouts"))?;
+        let finer = match parts.finer {
+            None => None,
+            Some(FinerParts { common, numbers }) => Some(
+                Remembered::stored(&numbers, &basis, common)?
+                    .ok_or_else(|| malformed("finer functions"))?,
+            ),
+        };
         Ok(Self {
+            whereabouts,
+            finer,
             basis,
             penalty: parts.penalty,
             weighting: parts.weighting,
@@ -248,6 +222,11 @@ impl Partial {
             common: self.common.clone(),
             sums: self.sums,
             triangle: self.triangle.packed(),
+            whereabouts: self.whereabouts.numbers(),
+            finer: self.finer.as_ref().map(|finer| FinerParts {
+                common: finer.names().to_vec(),
+                numbers: finer.numbers(),
+            }),
         }
     }
 
@@ -270,9 +249,21 @@ impl Partial {
         if self.common != other.common {
             return differs("common components");
         }
+        match (&mut self.finer, &other.finer) {
+            (Some(own), Some(others)) => own.merge(others),
+            (None, None) => {}
+            _ => return differs("truncation: some shares hold finer functions, others none"),
+        }
         self.triangle.merge(&other.triangle);
         self.sums.merge(&other.sums);
+        self.whereabouts.merge(&other.whereabouts);
         Ok(())
+    }
+
+    /// The narrowest feature that the fit of all readings taken in can show; of a beam, if these were
+    /// averaged over one.
+    pub fn resolves(&self, optics: Option<&Optics>) -> Resolves {
+        self.whereabouts.resolves(self.basis.spec(), optics)
     }
 
     /// Readings taken in.
@@ -327,9 +318,6 @@ impl Sums {
             && high.is_finite()
     }
 }
-
-/// How many readings the rows of a beam are made exact for.
-const READINGS_FORESEEN: usize = 10_000_000;
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::blocks::{self, Asked, Blocks, Totals};
-use crate::scattered::{BASIS, REGION, reading};
-use crate::{Common, Fit, Ray, Readings, Robust, Shift};
+use crate::scattered::{BASIS, REGION, part, reading};
+use crate::{Common, Fit, Noise, Penalised, Ray, Readings, Robust, Sample, Shift};
 
 /// Readings of a field that the basis holds, scattering by 0.41.
 fn samples(count: usize, u: impl Fn(usize) -> Option<f64>) -> Vec<Sample> {
@@ -97,7 +97,11 @@ impl Taken<'_> {
         ]
     }
 
-    fn share(mut self) -> Partial {
+    fn share(self) -> Partial {
+        self.share_with(false)
+    }
+
+    fn share_with(mut self, with_truncation: bool) -> Partial {
         let mut totals = Totals::default();
         let counted = self.each(&mut |block| {
             totals.take(block);
@@ -109,7 +113,7 @@ impl Taken<'_> {
             model: BASIS.into(),
             robust: Robust::None,
             optics: None,
-            with_truncation: false,
+            with_truncation,
             others: &[],
         };
         let share = blocks::share(&mut self, &totals, &asked).unwrap();
@@ -212,4 +216,111 @@ fn a_penalised_merge_equals_the_penalised_fit() {
         assert_alike(&merged, &whole, tolerance);
         assert!(merged.dof() > 300 - 135 && merged.dof() < 290);
     }
+}
+
+/// Two shares of samples on meridians, their field with a ridge that the basis can't follow.
+fn ridged(u: Option<f64>, width_rad: f64) -> (Vec<Sample>, Partial) {
+    let sample = |i: usize| {
+        let (ray, _) = reading(i);
+        let ray = Ray { phi_rad: 0.3 * (i % 21) as f64, theta_rad: 0.03 * (i / 21) as f64, ..ray };
+        let noise = part(i, 0.233_7) + part(i, 0.871_3) - 1.0;
+        let ridge = 6.0 * libm::exp(-((ray.theta_rad - 0.7) / width_rad).powi(2));
+        let noise_of = |u: f64| Noise::Fixed { variance: u * u };
+        Sample { ray, value: 80.0 + ridge + noise, noise: u.map_or(Noise::Unknown, noise_of) }
+    };
+    let samples: Vec<Sample> = (0..21 * 46).map(sample).collect();
+    let weighting = if u.is_some() { Weighting::Stated } else { Weighting::Alike };
+    let mut shares = samples.chunks(500).map(|samples| {
+        let share = Accumulator::new(REGION, BASIS, None, weighting).unwrap();
+        let mut share = share.with_truncation().unwrap();
+        share.absorb(samples).unwrap();
+        Partial::from_parts(share.finish().parts()).unwrap()
+    });
+    let mut merged = shares.next().unwrap();
+    shares.for_each(|share| merged.merge(&share).unwrap());
+    (samples, merged)
+}
+
+#[test]
+fn what_the_functions_cant_follow_is_in_the_merges_u_as_in_that_of_the_whole() {
+    for u in [Some(0.41), Some(0.1), None] {
+        let (samples, merged) = ridged(u, 0.15);
+        let bare = crate::fit(&samples, &REGION, BASIS, &[]).unwrap();
+        let whole = bare.clone().with_truncation(&samples, &[], &[], None).unwrap();
+        let resolves = merged.resolves(None);
+        assert_eq!(resolves, crate::Resolves::of(&samples, &REGION, BASIS, None));
+        let closed = merged.close(None).unwrap();
+        assert!(closed.fit.parts().truncation.is_some());
+        assert_followed_alike((&closed.fit, &whole, &bare), 2e-3);
+    }
+}
+
+/// By u of radiance along and across the ridge, and of the exitance, which are far more than those without truncation.
+fn assert_followed_alike((found, expected, bare): (&Fit, &Fit, &Fit), tolerance: f64) {
+    let along = |theta_rad: f64| {
+        move |fit: &Fit| {
+            fit.radiance(&Ray { x_m: 3e-3, y_m: 0.0, theta_rad, phi_rad: 0.8 }).u_independent
+        }
+    };
+    let exitance = |fit: &Fit| fit.exitance().u_independent;
+    let all: [&dyn Fn(&Fit) -> f64; 5] =
+        [&along(0.1), &along(0.5), &along(0.7), &along(1.0), &exitance];
+    for (i, u) in all.into_iter().enumerate() {
+        let (found, expected, bare) = (u(found), u(expected), u(bare));
+        assert!((found / expected - 1.0).abs() < tolerance, "number {i}: {found} {expected}");
+        assert!(found > 1.2 * bare, "number {i}: {found} {bare}");
+    }
+}
+
+#[test]
+fn a_run_s_shares_know_what_they_share_beside_what_the_functions_cant_follow() {
+    let (samples, _) = ridged(Some(0.41), 0.15);
+    let ways = vec![None; samples.len()];
+    let readings = Taken { samples: &samples, ways: &ways, block: 500 };
+    let common = Taken::common(0);
+    let all = Readings { common: &common, ..Readings::of(&samples) };
+    let bare = crate::fit_readings(&all, &REGION, BASIS, None).unwrap();
+    let whole = bare.clone().with_truncation(&samples, &[], &common, None).unwrap();
+    let share = readings.share_with(true);
+    let shown = share.parts().finer.map(|finer| finer.common);
+    assert_eq!(shown.unwrap(), ["axis", "drift"]);
+    let closed = share.close(None).unwrap();
+    assert_followed_alike((&closed.fit, &whole, &bare), 2e-2);
+}
+
+#[test]
+fn shares_with_and_without_finer_functions_are_not_merged() {
+    let (samples, mut merged) = ridged(Some(0.41), 0.15);
+    let said = merged.merge(&share(&samples, Weighting::Stated)).unwrap_err().to_string();
+    assert!(said.contains("truncation"), "{said}");
+    let parts = merged.parts();
+    let cut = |parts: &mut FinerParts| parts.numbers.truncate(900);
+    let impossible = |parts: &mut FinerParts| parts.numbers[3] = 2.0;
+    for change in [&cut as &dyn Fn(&mut FinerParts), &impossible] {
+        let mut wrong = parts.clone();
+        change(wrong.finer.as_mut().unwrap());
+        assert!(matches!(Partial::from_parts(wrong), Err(FitError::Parts { .. })));
+    }
+    let mut wrong = parts.clone();
+    wrong.whereabouts.pop();
+    assert!(matches!(Partial::from_parts(wrong), Err(FitError::Parts { .. })));
+}
+
+#[test]
+fn what_no_place_tells_is_left_out_at_the_merge() {
+    // At one place, of which no share knows that it is the only one: its finer functions are of a degree less.
+    let basis = BasisSpec::zernike(4, 0);
+    let (samples, _) = ridged(Some(0.41), 0.35);
+    let at_one =
+        |sample: &Sample| Sample { ray: Ray { x_m: 0.0, y_m: 0.0, ..sample.ray }, ..*sample };
+    let samples: Vec<Sample> = samples.iter().map(at_one).collect();
+    let share = Accumulator::new(REGION, basis, None, Weighting::Stated).unwrap();
+    let mut share = share.with_truncation().unwrap();
+    share.absorb(&samples).unwrap();
+    let closed = share.finish().close(None).unwrap();
+    let finer = closed.fit.parts().truncation.as_ref().map(|truncation| truncation.beyond);
+    assert_eq!(finer.unwrap().position, crate::Position::Legendre { degree: 0 });
+    let bare = crate::fit(&samples, &REGION, basis, &[]).unwrap();
+    let whole = bare.clone().with_truncation(&samples, &[], &[], None).unwrap();
+    assert_followed_alike((&closed.fit, &whole, &bare), 0.1);
 }

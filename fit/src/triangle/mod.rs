@@ -120,6 +120,26 @@ impl Triangle {
         scaled
     }
 
+    /// The same of some of its unknowns alone: of those that are kept, in their order.
+    ///
+    /// # Panics
+    /// When it isn't said of each unknown whether it is kept.
+    #[must_use]
+    pub(crate) fn keeping(&self, is_kept: &[bool]) -> Self {
+        assert_eq!(is_kept.len(), self.unknowns, "said of every unknown");
+        let mut whole = self.clone();
+        whole.settle();
+        let columns: Vec<usize> =
+            (0..self.columns()).filter(|j| is_kept.get(*j).copied().unwrap_or(true)).collect();
+        let mut kept = Self::new(columns.len() - self.sides, self.sides);
+        for i in 0..self.columns() {
+            let entry = |j: &usize| if *j < i { 0.0 } else { whole.r[(i, *j)] };
+            kept.absorb(&columns.iter().map(entry).collect::<Vec<f64>>());
+        }
+        kept.rows = self.rows;
+        kept
+    }
+
     /// The sum of squared residuals that these unknowns leave of the first right-hand side.
     pub fn residual_squares(&self, unknowns: &[f64]) -> f64 {
         let mut whole = self.clone();

@@ -1,26 +1,28 @@
 //! What the wider model takes of readings in its first walk through them: rows under the variances that the
-//! fit found and under the stated ones, and where they lie. It knows no prior.
+//! fit found and under the stated ones. It knows no prior.
 
 use super::heard::Heard;
-use super::uneven::Directions;
 use crate::FitError;
 use crate::triangle::Triangle;
 
 /// What one walk sums up.
+#[derive(Debug, Clone)]
 pub(super) struct Look {
     pub(super) found: Rows,
     /// Where these are others.
     pub(super) stated: Option<Rows>,
     /// The least part of a variance that is stated.
     pub(super) least: f64,
+    /// How many times as large variances may be as they were found.
+    pub(super) most: f64,
     /// Sums by weight of variances, found and stated, of readings that say what they read; and how many.
     pub(super) scatter: [f64; 2],
     pub(super) plain: f64,
-    pub(super) directions: Directions,
 }
 
 /// All readings under some variances: a triangle of the fit's functions, what samples share, the
 /// finer functions, and the values.
+#[derive(Debug, Clone)]
 pub(super) struct Rows {
     pub(super) is_stated: bool,
     pub(super) triangle: Triangle,
@@ -63,13 +65,19 @@ impl Look {
             found: Rows::new(columns, false),
             stated: with_stated.then(|| Rows::new(columns, true)),
             least: 1.0,
+            most: 1.0,
             scatter: [0.0; 2],
             plain: 0.0,
-            directions: Directions::new(),
         }
     }
 
-    pub(super) fn take(&mut self, heard: &Heard<'_>, kept: &[usize]) -> Result<(), FitError> {
+    /// Takes readings in; `told` hears of the row of each that says what it read.
+    pub(super) fn take(
+        &mut self,
+        heard: &Heard<'_>,
+        kept: &[usize],
+        mut told: impl FnMut(usize, &[f64]),
+    ) -> Result<(), FitError> {
         let columns = heard.own.basis().len() + heard.sides.len() + kept.len();
         let mut rooms = heard.rooms();
         let (mut row, mut weighted) = (vec![0.0; columns + 1], vec![0.0; columns + 1]);
@@ -90,9 +98,9 @@ impl Look {
                 self.scatter[0] += weight * found;
                 self.scatter[1] += weight * stated;
                 self.plain += 1.0;
+                told(i, &row[..columns]);
             }
         }
-        self.directions.take(heard);
         Ok(())
     }
 }

@@ -25,6 +25,7 @@
 mod heard;
 mod likeliest;
 mod look;
+mod remembered;
 mod uneven;
 mod wider;
 
@@ -34,9 +35,10 @@ use crate::grid::Grid;
 use crate::influence::Influence;
 use crate::solve::{levels, needs_a_side, sensitivities};
 use crate::weights::{Settled, has_unknown};
-use crate::{Angular, BasisSpec, Common, Fit, FitError, Position, Ray, Sample};
+use crate::{Angular, BasisSpec, Common, Fit, FitError, Position, Ray, Region, Sample};
 use heard::Once;
 pub(crate) use heard::{Heard, Taken, Walks};
+pub(crate) use remembered::Remembered;
 pub use uneven::Uneven;
 pub(crate) use wider::{Widened, Wider};
 
@@ -75,7 +77,7 @@ impl Fit {
         };
         let grid = Grid::of(samples, self.region());
         let places = grid.x_m.len().max(grid.y_m.len());
-        let Some(finer) = Finer::of(&self, places) else { return Ok(self) };
+        let Some(finer) = Finer::of(self.basis(), self.region(), places) else { return Ok(self) };
         if influence.variances.len() != samples.len() {
             return Ok(self);
         }
@@ -123,19 +125,22 @@ impl Shared {
         // What was fitted along, the fit is already corrected for.
         let none = vec![0.0; fit.functions().len()];
         let mut shared = Self { names: Vec::new(), shifts: vec![none; known.nuisances] };
-        let shifts = &fit.parts().shifts;
-        for common in
-            common.iter().filter(|c| c.shift.is_shared() && needs_a_side(c, known.holds_constant))
-        {
-            let shift = shifts.iter().find(|shift| shift.name == common.name);
-            let Some(shift) = shift else { continue };
+        for common in common.iter().filter(|c| shows(c, known.holds_constant)) {
             // One that changes no reading changes no coefficient.
-            if shift.shift.iter().any(|value| *value != 0.0) {
+            let shift = shift_of(fit, &common.name);
+            if let Some(shift) = shift.filter(|shift| shift.iter().any(|value| *value != 0.0)) {
                 shared.names.push(common.name.clone());
-                shared.shifts.push(shift.shift.clone());
+                shared.shifts.push(shift.to_vec());
             }
         }
         shared
+    }
+
+    /// Of components that are known by their names alone.
+    fn named(fit: &Fit, names: &[String]) -> Self {
+        let none = || vec![0.0; fit.functions().len()];
+        let shift = |name: &String| shift_of(fit, name).map_or_else(none, <[f64]>::to_vec);
+        Self { names: names.to_vec(), shifts: names.iter().map(shift).collect() }
     }
 
     /// The change of every value by one u of each, as the fit found it.
@@ -165,8 +170,18 @@ impl Shared {
     }
 }
 
+/// Whether a component shows in residuals: one that all samples share, and that the fit's functions can't do.
+pub(crate) fn shows(common: &Common, holds_constant: bool) -> bool {
+    common.shift.is_shared() && needs_a_side(common, holds_constant)
+}
+
+fn shift_of<'f>(fit: &'f Fit, name: &str) -> Option<&'f [f64]> {
+    let found = fit.parts().shifts.iter().find(|shift| shift.name == name)?;
+    Some(&found.shift)
+}
+
 /// What follows what a fit's own functions can't.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Finer {
     /// Harmonics on the sphere: under their prior a field that varies as much everywhere.
     spec: BasisSpec,
@@ -182,18 +197,16 @@ impl Finer {
     /// degrees more in direction. Where even the same everywhere they are too many, those of the fit's
     /// own degrees are left out; `None` where they still are, see [`Fit::with_truncation`].
     /// `places`: distinct positions along the axis that has more of them.
-    pub(crate) fn of(fit: &Fit, places: usize) -> Option<Self> {
-        let own = fit.basis();
+    pub(crate) fn of(own: BasisSpec, region: &Region, places: usize) -> Option<Self> {
         let degree = match own.angular {
             Angular::Zernike { degree, .. }
             | Angular::EvenHarmonics { degree }
             | Angular::Hemispherical { degree } => degree,
-            Angular::Spherical { degree } if !fit.region().chart.is_whole_sphere() => degree,
+            Angular::Spherical { degree } if !region.chart.is_whole_sphere() => degree,
             Angular::Splines { .. } => OF_SPLINES,
             Angular::Spherical { .. } | Angular::SecondPlane { .. } => return None,
         };
-        let position = own.position.degree().unwrap_or(0);
-        let most = position.max((position + 1).min(places.saturating_sub(1)));
+        let most = most_of_position(own, places);
         let all = (0..=most).rev().map(|position| (position, 0)).chain([(0, degree + 1)]);
         let tried = all.flat_map(|(position, least)| {
             let degrees = (degree + 2..=degree + DEGREES).rev();
@@ -207,6 +220,18 @@ impl Finer {
             .filter(|(spec, _)| spec.checked_len().is_ok())
             .map(|(spec, least)| Self::within(own, spec, least))
             .find(|finer| finer.kept.len() <= FUNCTIONS_MAX)
+    }
+
+    /// The same as fine in position alone as so many places tell; which of the kept functions are left.
+    fn narrowed(&self, own: BasisSpec, places: usize) -> (Self, Vec<bool>) {
+        let most = most_of_position(own, places);
+        let degree = self.spec.position.degree().map_or(most, |degree| degree.min(most));
+        let position = Position::Legendre { degree };
+        let width = self.spec.angular.len();
+        let is_left: Vec<bool> = self.kept.iter().map(|k| k / width < position.len()).collect();
+        let left = self.kept.iter().zip(&is_left).filter(|(_, is_left)| **is_left);
+        let kept = left.map(|(k, _)| *k).collect();
+        (Self { spec: BasisSpec { position, ..self.spec }, kept, ..self.clone() }, is_left)
     }
 
     /// Of harmonics that the fit doesn't have those from a degree on.
@@ -231,6 +256,12 @@ impl Finer {
         let is_harmonic = matches!(own.angular, Angular::Spherical { .. });
         Self { spec, kept, polynomials: if is_harmonic { Vec::new() } else { held } }
     }
+}
+
+/// The highest degree of position that tells more than the fit's own functions do, of so many distinct places.
+fn most_of_position(own: BasisSpec, places: usize) -> usize {
+    let position = own.position.degree().unwrap_or(0);
+    position.max((position + 1).min(places.saturating_sub(1)))
 }
 
 /// Degrees beyond the fit's own at most.

@@ -31,6 +31,25 @@ struct Cell {
 }
 
 impl Uneven {
+    /// Of groups of readings with their mean rows, one a column; `factor` is S of the unknowns' covariance.
+    pub(super) fn of(groups: &[Group], rows: &Mat<f64>, factor: &Mat<f64>) -> Self {
+        let mut cells = Vec::with_capacity(groups.len());
+        for (k, some) in groups.chunks(ROWS).enumerate() {
+            let fitted = factor.transpose() * rows.as_ref().subcols(k * ROWS, some.len());
+            cells.extend(some.iter().enumerate().map(|(j, group)| {
+                let Group { count, variances, residual, towards } = *group;
+                let variance = variances / (count * count);
+                // What is left of a value beside the others is its residual over this part, with the
+                // variance over it.
+                let known = dot(fitted.col_as_slice(j), fitted.col_as_slice(j)) / variance;
+                let part = (1.0 - known).max(PART_LEAST);
+                let ratio = residual * residual / (variance * part);
+                Cell { towards: towards.normalize_or(DVec3::Z), ratio }
+            }));
+        }
+        Self { cells, symmetry: None }
+    }
+
     /// What the variance of all that is missed along a ray is to be multiplied by: the mean ratio of the
     /// nearest measured directions, the nearer the more; never less than 1.
     pub(crate) fn times(&self, theta_rad: f64, phi_rad: f64) -> f64 {
@@ -106,23 +125,7 @@ impl Wider<'_> {
             means.take(heard, noise, self.kept());
             Ok(())
         })?;
-        let cells = means.groups.len();
-        let mut all = Vec::with_capacity(cells);
-        for from in (0..cells).step_by(ROWS) {
-            let some = from..(from + ROWS).min(cells);
-            let fitted = factor.transpose() * means.rows.as_ref().subcols(from, some.len());
-            all.extend(some.enumerate().map(|(k, group)| {
-                let Group { count, variances, residual, towards } = means.groups[group];
-                let variance = variances / (count * count);
-                // What is left of a value beside the others is its residual over this part, with the
-                // variance over it.
-                let known = dot(fitted.col_as_slice(k), fitted.col_as_slice(k)) / variance;
-                let part = (1.0 - known).max(PART_LEAST);
-                let ratio = residual * residual / (variance * part);
-                Cell { towards: towards.normalize_or(DVec3::Z), ratio }
-            }));
-        }
-        Ok(Uneven { cells: all, symmetry: None })
+        Ok(Uneven::of(&means.groups, &means.rows, &factor))
     }
 }
 
@@ -164,7 +167,8 @@ impl Directions {
     }
 }
 
-fn cell(cells_a_unit: f64, towards: DVec3) -> [i32; 3] {
+/// The cell of a direction.
+pub(super) fn cell(cells_a_unit: f64, towards: DVec3) -> [i32; 3] {
     let cell = (cells_a_unit * towards).to_array().map(libm::round);
     #[allow(clippy::cast_possible_truncation)] // up to CELLS_A_UNIT
     cell.map(|index| index as i32)
@@ -172,12 +176,12 @@ fn cell(cells_a_unit: f64, towards: DVec3) -> [i32; 3] {
 
 /// Readings of one direction together.
 #[derive(Debug, Clone, Copy)]
-struct Group {
-    count: f64,
-    variances: f64,
+pub(super) struct Group {
+    pub(super) count: f64,
+    pub(super) variances: f64,
     /// What they lie off the model on average.
-    residual: f64,
-    towards: DVec3,
+    pub(super) residual: f64,
+    pub(super) towards: DVec3,
 }
 
 /// Means over readings of one direction.
@@ -238,8 +242,8 @@ const OWN: f64 = 1.0 / 16.0;
 /// Of readings that nothing else says anything of not less than this part is left.
 const PART_LEAST: f64 = 1e-6;
 /// About a quarter of a degree, and more where directions are more than this.
-const CELLS_A_UNIT: f64 = 200.0;
-const CELLS_MAX: usize = 2000;
+pub(super) const CELLS_A_UNIT: f64 = 200.0;
+pub(super) const CELLS_MAX: usize = 2000;
 /// Cells half as fine, and so on, of which the last are fewer than this on all the sphere.
 const FINENESSES: i32 = 6;
 /// Rows at a time.

@@ -4,6 +4,7 @@
 use super::heard::{Taken, Walks};
 use super::likeliest::{Hold, Likeliest, POWER, Shares};
 use super::look::{Look, Rows};
+use super::uneven::{Directions, Uneven};
 use super::{Finer, Shared, Truncation};
 use crate::basis::{Basis, dot};
 use crate::beam::design::Design;
@@ -52,6 +53,11 @@ pub(crate) struct Widened {
 }
 
 impl Widened {
+    /// What the likeliest model multiplies the variances by that it was told of.
+    pub(crate) fn scale(&self) -> f64 {
+        self.noise.scale
+    }
+
     /// The readings' variances as the covariance takes them, of those of the fit and what of them is stated.
     pub(crate) fn variances(
         &self,
@@ -101,6 +107,27 @@ impl<'f> Wider<'f> {
         })
     }
 
+    /// Of readings that were forgotten, by what is left of them; `names` are of what they share.
+    pub(super) fn of_shares(
+        fit: &'f Fit,
+        finer: Finer,
+        names: &[String],
+        (has_unknown, excess): (bool, f64),
+    ) -> Result<Self, FitError> {
+        let Finer { spec, kept, polynomials } = finer;
+        Ok(Self {
+            fit,
+            prior: Prior::new(fit.functions(), fit.penalty())?,
+            shared: Shared::named(fit, names),
+            beyond: Basis::new(spec, *fit.region())?,
+            kept,
+            polynomials,
+            has_unknown,
+            excess,
+            robust: Robust::None,
+        })
+    }
+
     /// What finer functions are of.
     pub(crate) fn beyond(&self) -> &Basis {
         &self.beyond
@@ -130,9 +157,22 @@ impl<'f> Wider<'f> {
         let columns = self.known() + self.kept.len();
         // The misfit may be what the functions can't follow, noise that isn't stated, or both.
         let mut look = Look::new(columns, self.excess != 0.0 && !self.has_unknown);
-        walks.each(&mut |heard| look.take(heard, &self.kept))?;
-        let Look { found, stated, least, scatter, plain, directions } = look;
-        let (joint, Priors { likeliest: found, other }) = self.likeliest(found, stated, least)?;
+        let mut directions = Directions::new();
+        walks.each(&mut |heard| {
+            directions.take(heard);
+            look.take(heard, &self.kept, |_, _| {})
+        })?;
+        self.concluded(look, |noise, solution| self.uneven(walks, noise, &directions, solution))
+    }
+
+    /// What one look at all readings says, and where more is missed than elsewhere, as `uneven` finds out.
+    pub(super) fn concluded<E: From<FitError>>(
+        &self,
+        look: Look,
+        uneven: impl FnOnce(Noise, &Solution) -> Result<Uneven, E>,
+    ) -> Result<Option<Widened>, E> {
+        let (scatter, plain) = (look.scatter, look.plain);
+        let (joint, Priors { likeliest: found, other }) = self.likeliest(look)?;
         let is_wider = found.strength.is_finite();
         if !is_wider && self.excess == 0.0 {
             return Ok(None);
@@ -147,7 +187,7 @@ impl<'f> Wider<'f> {
         let inflated = factor.iter().map(|value| inflation * value).collect();
         let mut parts = Parts { factor: inflated, ..self.fit.parts().clone() };
         if is_wider {
-            let uneven = self.uneven(walks, noise, &directions, &solution)?;
+            let uneven = uneven(noise, &solution)?;
             let mut missed = self.missed(&solution, &whole);
             if let Some(other) = other {
                 self.mix(&mut missed, &joint, (&found, &other))?;
@@ -162,19 +202,15 @@ impl<'f> Wider<'f> {
 
     /// The likeliest model, with finer functions where they make the readings likelier than chance
     /// would.
-    fn likeliest(
-        &self,
-        found: Rows,
-        stated: Option<Rows>,
-        least: f64,
-    ) -> Result<(Joint, Priors), FitError> {
+    fn likeliest(&self, look: Look) -> Result<(Joint, Priors), FitError> {
+        let Look { found, stated, least, most, .. } = look;
         let joint = self.joint(found)?;
         if self.excess == 0.0 {
             let found = self.at_scales(&joint, 1.0..=1.0)?;
             return Ok((joint, found));
         }
         let least = if self.has_unknown { SCALE_LEAST } else { least.max(SCALE_LEAST) };
-        let found = self.at_scales(&joint, least..=1.0)?;
+        let found = self.at_scales(&joint, least..=most)?;
         let Some(stated) = stated else { return Ok((joint, found)) };
         let other = self.joint(stated)?;
         let by_stated = self.at_scales(&other, 1.0..=SCALE_MOST)?;
@@ -423,4 +459,4 @@ const GAIN_MIN: f64 = 12.0;
 const SCALE_LEAST: f64 = 1e-12;
 /// Of stated ones: who states a noise knows it to a factor of ten. What is beyond that the functions
 /// can't follow, or it is as large in the dark as in the light.
-const SCALE_MOST: f64 = 100.0;
+pub(super) const SCALE_MOST: f64 = 100.0;
