@@ -81,6 +81,25 @@ fn a_run_ends_at_its_target_and_its_true_error_is_what_it_says() {
 }
 
 #[test]
+fn the_curve_of_a_run_says_how_little_its_first_rounds_knew() {
+    let bench = bench();
+    let (_, summary) = run(&bench);
+    let mut csv = csv::Reader::from_path(bench.path("out/accuracy.csv")).unwrap();
+    let points: Vec<Vec<f64>> = csv
+        .records()
+        .map(|record| record.unwrap().iter().map(|field| field.parse().unwrap()).collect())
+        .collect();
+    assert!(points.len() >= 6, "{points:?}");
+    let truth = number(&summary["truth"]["exitance_w_per_m2"]);
+    for point in &points {
+        let (exitance, u) = (point[2], point[3]);
+        assert!((exitance - truth).abs() < 4.0 * u, "{point:?}, truly {truth}");
+    }
+    let (first, last) = (&points[0], &points[points.len() - 1]);
+    assert!(first[5] > 10.0 * last[5], "{first:?} {last:?}");
+}
+
+#[test]
 fn a_finer_target_takes_more_sweeps_and_gets_nearer() {
     let (coarse, coarsely) = run(&asked(bench(), "0.2"));
     let (fine, finely) = run(&asked(bench(), "0.02"));

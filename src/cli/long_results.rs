@@ -5,13 +5,14 @@ use std::io::{self, Write};
 
 use fit::{Fit, FittedNuisance, Optics, Robust, Wish};
 
+use super::accuracy;
 use super::long_run::{BLOCK_READINGS, IN_BLOCKS, LongFit, LongRun};
-use super::results::{ACCURACY_CONDITION_MAX, Results, compare, fit_region, optics};
+use super::results::{Results, compare, fit_region, optics};
 use super::setup::Setup;
 use super::stream::Stopped;
 use super::tally::Tally;
 use super::{derive, failure::Failure};
-use crate::export::{AccuracyPoint, SamplesFile, TreatedReadings, Treatment};
+use crate::export::{SamplesFile, TreatedReadings, Treatment};
 use crate::journal::{Order, Reader};
 use crate::rig::calibration::{Calibrated, Fitted, IndependentParts, Sample};
 use crate::rig::{Reading, ReadingKind};
@@ -86,7 +87,8 @@ impl Results {
         let blocks = made
             .as_ref()
             .map_or_else(|_| InBlocks::without_fit(), |made| InBlocks::of(made, wish.rules.robust));
-        let accuracy = fit.and_then(|fit| whole(fit, &tally)).into_iter().collect();
+        let point = fit.and_then(|fit| accuracy::point(fit, tally.ended_s, tally.measured));
+        let accuracy = point.into_iter().collect();
         let independent =
             made.as_ref().map_or(IndependentParts::NONE, |made| made.independent.clone());
         let levels = samples.iter().filter_map(|(_, level)| *level).collect();
@@ -216,16 +218,6 @@ fn stated(
 /// plan.
 fn is_shown(reading: u32, of: usize) -> bool {
     (f64::from(reading) * GOLDEN).fract() * (of as f64) < SHOWN_MAX as f64
-}
-
-/// The last point of the accuracy's course, by the rule of all others.
-fn whole(fit: &Fit, tally: &Tally) -> Option<AccuracyPoint> {
-    (fit.condition() <= ACCURACY_CONDITION_MAX).then(|| AccuracyPoint {
-        rig_s: tally.ended_s,
-        readings: tally.measured as u64,
-        exitance: fit.exitance(),
-        flux: fit.flux(),
-    })
 }
 
 fn fitted(made: LongFit) -> Fitted {

@@ -1,6 +1,7 @@
 //! The command line: arguments, progress, exit codes. The one place where wall time is read and
 //! where a simulated rig is put together; after it there are types.
 
+mod accuracy;
 mod acquire;
 mod adapting;
 mod args;

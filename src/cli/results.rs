@@ -5,8 +5,9 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use fit::{Fit, FitError, Optics, Region, Rules, Wish};
+use fit::{Fit, FitError, Optics, Region, Wish};
 
+use super::accuracy;
 use super::adapting;
 use super::derive::{derive, write_tables};
 use super::failure::Failure;
@@ -25,12 +26,6 @@ use crate::journal::{Header, InputRole, Order, Reader};
 use crate::rig::Reading;
 use crate::rig::calibration::{Calibrated, Fitted, IndependentParts, Part, Sample, calibrate};
 use crate::study::Score;
-
-/// Points of the accuracy curve at most: each is a fit of its own.
-const ACCURACY_POINTS: u32 = 12;
-/// Beyond this condition a least-squares fit asks for regularisation rather than for digits: an
-/// error of 1e-4 may be one of the order of 1.
-pub(super) const ACCURACY_CONDITION_MAX: f64 = 1e4;
 
 /// What a run says.
 #[derive(Debug)]
@@ -86,7 +81,7 @@ impl Results {
         let compared = fitted.as_ref().ok().and_then(|fitted| compare(setup, &region, &fitted.fit));
         let (truth, score) = compared.unzip();
         let course = |fitted: &Fitted| {
-            accuracy(&calibrated, &region, &fitted.fit, &wish.rules, optics.as_ref())
+            accuracy::course(&calibrated, &region, fitted, &wish.rules, optics.as_ref())
         };
         let accuracy = fitted.as_ref().map_or_else(|_| Vec::new(), course);
         let derived = fitted.as_ref().map_or_else(
@@ -316,50 +311,4 @@ pub(crate) fn compare(setup: &Setup, region: &Region, fit: &Fit) -> Option<(Trut
         radiance_error_rms_relative: score.map(|score| score.rms_relative),
     };
     Some((stated, score))
-}
-
-/// Fits of the first readings in the basis that all of them chose, ever more of them: half as many
-/// for two points further back; the last is the fit of all, which is there.
-/// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
-/// of it is determined by its noise and its truncation alone, and is no point of the curve. Rows
-/// along the axes alone tell that beforehand, at a small part of the cost of beams that are cut.
-fn accuracy(
-    calibrated: &Calibrated,
-    region: &Region,
-    whole: &Fit,
-    rules: &Rules,
-    optics: Option<&Optics>,
-) -> Vec<AccuracyPoint> {
-    let model = whole.model();
-    let total = calibrated.samples.len();
-    let mut counts: Vec<usize> = (0..ACCURACY_POINTS)
-        .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
-        // Between zero and the count of samples.
-        .map(|count| {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let count = count as usize;
-            count
-        })
-        .collect();
-    counts.sort_unstable();
-    counts.dedup();
-    let point = |count: usize| {
-        let known = calibrated.first(count);
-        let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
-        let is_point = |fit: &Fit| fit.condition() <= ACCURACY_CONDITION_MAX;
-        let fit = if count == total {
-            whole.clone()
-        } else if is_point(&known.fit_as(region, model, rules, None).ok()?.fit) {
-            known.fit_as(region, model, rules, optics).ok()?.fit
-        } else {
-            return None;
-        };
-        is_point(&fit).then(|| AccuracyPoint {
-            rig_s: last.fold(0.0, f64::max),
-            readings: count as u64,
-            exitance: fit.exitance(),
-            flux: fit.flux(),
-        })
-    };
-    counts.into_iter().filter_map(point).collect()
 }

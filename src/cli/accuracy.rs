@@ -1,0 +1,70 @@
+//! How the uncertainty of a run's exitance came down with rig time: fits of the readings taken first, ever
+//! more of them. It does not know where the curve is written or drawn.
+
+use fit::{Choice, Chosen, Fit, Optics, Penalised, Region, Rules};
+
+use crate::export::AccuracyPoint;
+use crate::rig::calibration::{Calibrated, Fitted};
+
+/// Points of the curve at most: each is a fit of its own.
+const POINTS_MAX: u32 = 12;
+/// Beyond this condition a least-squares fit asks for regularisation rather than for digits: an
+/// error of 1e-4 may be one of the order of 1.
+const CONDITION_MAX: f64 = 1e4;
+
+/// Fits of the first readings in the basis that all of them chose, ever more of them: half as many
+/// for two points further back; the last is the fit of all, which is there. What the functions can't follow
+/// is in each one's u as in that of the whole.
+/// Readings in the order of travel cover the region only in the end; a fit that rests on a corner
+/// of it is determined by its noise and its truncation alone, and is no point of the curve. Rows
+/// along the axes alone tell that beforehand, at a small part of the cost of beams that are cut.
+pub(super) fn course(
+    calibrated: &Calibrated,
+    region: &Region,
+    fitted: &Fitted,
+    rules: &Rules,
+    optics: Option<&Optics>,
+) -> Vec<AccuracyPoint> {
+    let whole = &fitted.fit;
+    let chosen = fitted.choice.as_ref().and_then(Choice::chosen);
+    let chosen = chosen.unwrap_or_else(|| {
+        let model = Penalised::new(whole.basis(), whole.penalty());
+        Chosen { model, others: Vec::new() }
+    });
+    let total = calibrated.samples.len();
+    let mut counts: Vec<usize> = (0..POINTS_MAX)
+        .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
+        // Between zero and the count of samples.
+        .map(|count| {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let count = count as usize;
+            count
+        })
+        .collect();
+    counts.sort_unstable();
+    counts.dedup();
+    let after = |count: usize| {
+        let known = calibrated.first(count);
+        let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
+        let fit = if count == total {
+            whole.clone()
+        } else if is_point(&known.fit_as(region, chosen.model, rules, None).ok()?.fit) {
+            known.fit_known(region, &chosen, rules, optics).ok()?
+        } else {
+            return None;
+        };
+        point(&fit, last.fold(0.0, f64::max), count)
+    };
+    counts.into_iter().filter_map(after).collect()
+}
+
+/// The point of a fit of so many readings; none of a fit that rests on what its poses hardly determine.
+pub(super) fn point(fit: &Fit, rig_s: f64, readings: usize) -> Option<AccuracyPoint> {
+    let (exitance, flux, readings) = (fit.exitance(), fit.flux(), readings as u64);
+    is_point(fit).then_some(AccuracyPoint { rig_s, readings, exitance, flux })
+}
+
+/// Where a penalty holds what poses do not determine, u says how little that is.
+fn is_point(fit: &Fit) -> bool {
+    !fit.penalty().is_none() || fit.condition() <= CONDITION_MAX
+}
