@@ -9,10 +9,12 @@
 #[allow(dead_code, reason = "tests share them")]
 #[path = "../tests/scenes/mod.rs"]
 mod drawn;
+mod laid_out;
 
 use drawn::Die;
 use fit::{Noise, Optics, Ray, Region, Sample, Wish};
 use glam::{DVec3, dvec3};
+use laid_out::{PATCH, POINT, lobe, patches_of, truth_rays};
 use radiometry::beam::Beam;
 use radiometry::direction::{angles, unit};
 use radiometry::quadrature::Sobol;
@@ -75,9 +77,6 @@ fn scenes() -> Result<Vec<Scene>, Box<dyn Error>> {
     ])
 }
 
-/// At one place; what lies beyond 80° is not asked for.
-const POINT: Region = Region::surface((0.0, 0.0), (0.0, 0.0), 80.0 * PI / 180.0);
-const PATCH: Region = Region::surface((-0.02, 0.02), (-0.02, 0.02), 80.0 * PI / 180.0);
 const STRIPE: Region = Region::surface((-0.012, 0.012), (-0.012, 0.012), 60.0 * PI / 180.0);
 
 // Fields; the largest value of each is about 1.
@@ -125,12 +124,6 @@ fn stripe(ray: &Ray) -> f64 {
     (0.1 + 0.9 * libm::exp(-0.5 * across * across)) * (0.5 + 0.5 * libm::cos(ray.theta_rad))
 }
 
-/// exp(g (cos of the angle to a direction - 1)).
-fn lobe(ray: &Ray, g: f64, theta_deg: f64, phi_deg: f64) -> f64 {
-    let axis = unit(theta_deg.to_radians(), phi_deg.to_radians());
-    libm::exp(g * (unit(ray.theta_rad, ray.phi_rad).dot(axis) - 1.0))
-}
-
 // Plans
 
 /// Lines through the normal, `lines` of them half a turn round, read every `step_deg`.
@@ -141,46 +134,6 @@ fn sweeps(to_deg: f64, step_deg: f64, lines: usize) -> Vec<Ray> {
 /// The same at places spread over a region.
 fn patches(region: &Region, side: usize, step_deg: f64, lines: usize) -> Vec<Ray> {
     patches_of(region, side, region.theta_max_rad.to_degrees(), step_deg, lines)
-}
-
-fn patches_of(region: &Region, side: usize, to_deg: f64, step_deg: f64, lines: usize) -> Vec<Ray> {
-    #[allow(clippy::cast_possible_truncation)] // a few hundred
-    let steps = libm::round(to_deg / step_deg) as i32;
-    let at = |(from, to): (f64, f64), i: usize| {
-        if side == 1 {
-            f64::midpoint(from, to)
-        } else {
-            from + (to - from) * i as f64 / (side - 1) as f64
-        }
-    };
-    let mut rays = Vec::new();
-    for place in 0..side * side {
-        for line in 0..lines {
-            let phi_rad = PI * line as f64 / lines as f64;
-            for step in -steps..=steps {
-                let theta_rad = (f64::from(step.abs()) * step_deg).to_radians();
-                let phi_rad = if step < 0 { phi_rad - PI } else { phi_rad };
-                let (x_m, y_m) = (at(region.x_m, place % side), at(region.y_m, place / side));
-                rays.push(Ray { x_m, y_m, theta_rad, phi_rad });
-            }
-        }
-    }
-    rays
-}
-
-/// Evenly in throughput over the region: RMS over these is the throughput-weighted one.
-fn truth_rays(region: &Region) -> Result<Vec<Ray>, Box<dyn Error>> {
-    let mut sobol = Sobol::<4>::new()?;
-    let sin_most = libm::sin(region.theta_max_rad.min(FRAC_PI_2));
-    let between = |(from, to): (f64, f64), t: f64| from + (to - from) * t;
-    let ray = |t: [f64; 4]| Ray {
-        x_m: between(region.x_m, t[2]),
-        y_m: between(region.y_m, t[3]),
-        theta_rad: libm::asin(sin_most * t[0].sqrt()),
-        phi_rad: TAU * t[1],
-    };
-    let mut next = || sobol.next_point().map(|bits| (f64::from(bits) + 0.5) * 2f64.powi(-32));
-    Ok((0..TRUTH).map(|_| ray(next())).collect())
 }
 
 /// (1/T) ∫ L dT by counting rays between points of pupil and spot, dT = cos cos dA dA / r².
@@ -234,7 +187,7 @@ fn of_scene(scene: &Scene, directory: &Path) -> Result<String, Box<dyn Error>> {
     for Sample { ray, value, .. } in &samples {
         writeln!(readings, "{},{value:e},{:e}", in_numbers(ray), scene.u)?;
     }
-    for ray in truth_rays(&scene.region)? {
+    for ray in truth_rays(&scene.region, TRUTH)? {
         writeln!(truth, "{},{:e}", in_numbers(&ray), (scene.field)(&ray))?;
         let found = fit.radiance(&ray);
         writeln!(ours, "{:e},{:e}", found.value, found.u)?;
