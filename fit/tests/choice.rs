@@ -264,6 +264,28 @@ fn what_is_narrow_both_ways_is_followed_in_a_patch() {
     assert!(coarse > 3.0 * rms, "{coarse} {rms}");
 }
 
+/// Whole sweeps are left out, so that nothing tells how functions go between a sweep's readings: in patches of a
+/// third of their distance a lobe this narrow was off by a fifth.
+#[test]
+fn no_patch_is_much_finer_than_readings_along_a_sweep() {
+    let field: Field = |ray| 0.2 * libm::cos(ray.theta_rad) + lobe(ray, 1300.0, 30.0, 101.0);
+    let samples = noisy(&raster_rays(&CONE, 21, 36, 1), field, 0.002, &mut Die::new(7));
+    let (_, choice) = fitted(&samples, &CONE);
+    let step_deg = CONE.theta_max_rad.to_degrees() / 20.0;
+    let mut patches = 0;
+    for candidate in &choice.candidates {
+        let Angular::Splines { theta_spans, fine, .. } = candidate.model.basis.angular else {
+            continue;
+        };
+        if !fine.around.is_none() {
+            let narrowest_deg = 90.0 / (theta_spans << fine.halvings) as f64;
+            assert!(step_deg <= 2.0 * narrowest_deg, "{candidate:?}");
+            patches += 1;
+        }
+    }
+    assert!(patches > 2);
+}
+
 /// Many functions of the position leave no room for splines in direction: no patch, and no refusal.
 #[test]
 fn a_patch_that_is_not_affordable_is_not_tried() {

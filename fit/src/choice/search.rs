@@ -2,7 +2,7 @@
 //! better, and splines finer in θ where their residuals say so.
 
 use super::family::{Family, Strengths, Trial};
-use super::{AngularKind, Sweeps, Wish, smallest};
+use super::{AngularKind, SweepKind, Sweeps, Wish, smallest};
 use crate::beam::Optics;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
@@ -23,6 +23,8 @@ pub(super) struct Search<'s> {
     u: Vec<f64>,
     pub(super) strengths: Strengths,
     pub(super) folds: Vec<Vec<usize>>,
+    /// What is left out.
+    pub(super) kind: SweepKind,
     /// The samples' distinct coordinates.
     grid: Arc<Grid>,
     /// Highest degree in position that places tell apart.
@@ -54,6 +56,7 @@ impl<'s> Search<'s> {
             u: samples.iter().map(|sample| model.u_of(sample)).collect(),
             strengths: wish.strengths(scale_min),
             folds: sweeps.folds(FOLDS, one_by_one),
+            kind: sweeps.kind,
             position_most: distinct.saturating_sub(1),
             grid: Arc::new(grid),
             coefficients_max: most.min(samples.len()),
