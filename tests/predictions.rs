@@ -62,6 +62,13 @@ fn what_the_plan_s_features_leave_is_said_with_its_range_and_what_lies_beyond_wi
     for part in ["within 80.0°", "not foretold: 3.02 % of the exitance", "--rehearse"] {
         assert!(said.out.contains(part), "{part}: {said}");
     }
+    // Of features in position alone a fit can't know that there are none in direction.
+    let alone = "narrowest_feature_mm stands alone";
+    assert!(!said.out.contains(alone), "{said}");
+    let in_position =
+        expecting().with("plan.toml", "[expect]", "[expect]\nnarrowest_feature_mm = 8");
+    let said = in_position.gonio(&["plan", "plan.toml"]).well();
+    assert!(said.out.contains(alone), "{said}");
     let json = bench.gonio(&["plan", "plan.toml", "--json"]).well().json();
     for quantity in ["radiance", "exitance_w_per_m2", "exitance_within_region_w_per_m2"] {
         let of = |key: &str| number(&json, &format!("/uncertainty/{quantity}/{key}"));

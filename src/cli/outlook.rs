@@ -107,6 +107,12 @@ fn not_foretold(forecast: &Forecast, within: &str) -> String {
         said.push_str(within);
         said.push_str(". --rehearse shows it\n");
     }
+    if forecast.is_direction_open {
+        said.push_str(
+            "  not foretold: expect.narrowest_feature_mm stands alone; a fit that finds structure in position \
+             states\n  besides what may lie between the directions that are read. --rehearse shows it\n",
+        );
+    }
     said
 }
 

@@ -50,6 +50,9 @@ pub struct Forecast {
     pub radiance_worst: f64,
     /// The same without the scale.
     pub radiance_worst_without_scale: f64,
+    /// Whether the plan declares features in position and none in direction: a fit that finds the one looks for
+    /// the other, too, and states what may lie between the directions that were read.
+    pub is_direction_open: bool,
     /// What the light itself leaves of the radiance's relative u, were there no other noise and no
     /// other error: √(p/N) for p coefficients from N photoelectrons, the mean over the readings of
     /// a fit of p coefficients to readings of equal noise.
@@ -177,6 +180,7 @@ impl Forecast {
             of_radiance,
             radiance_worst: worst[0],
             radiance_worst_without_scale: worst[1],
+            is_direction_open: features[0].is_empty() && !features[1].is_empty(),
             photon_limit,
             saturates: prior.level > rig.detector.saturation_radiance(gain),
         })

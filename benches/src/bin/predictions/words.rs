@@ -30,8 +30,9 @@ const OF_PLANS: [(&str, &str); 5] = [
     ),
     (
         "penumbra",
-        "one straight edge is kinder to the basis than stripes of its width in any place and direction: its \
-         fits are less off than foretold, and state more than either",
+        "one straight edge is kinder to the basis than stripes of its width in any place and direction, and its \
+         fits are less off than foretold; but two angles 60° apart are read, of which the plan declares nothing, \
+         and its fits state what may lie between them",
     ),
     ("servo-arm", OF_SCATTER),
     (
