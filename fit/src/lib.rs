@@ -48,6 +48,7 @@ pub use beam::{Optics, Outline};
 pub use chart::{Chart, Face};
 pub use choice::{
     AngularKind, Candidate, Choice, Chosen, Gleaning, Spans, SweepKind, Wish, WishClash, choose,
+    choose_flown,
 };
 pub use coverage::Coverage;
 pub use error::FitError;

@@ -1,7 +1,7 @@
 //! From readings to the field by rules that a person set: basis chosen, weights settled, symmetry tested,
 //! darkness kept from being darker. The one way that runs and files go.
 
-use crate::choice::{Choice, Chosen, Wish, choose};
+use crate::choice::{Choice, Chosen, Wish};
 use crate::solve::check_readings;
 use crate::{
     Fit, FitError, Nonnegative, Optics, Penalised, Readings, Region, Robust, Sample, Symmetry,
@@ -87,6 +87,8 @@ fn fit_chosen(
 ) -> Result<(Fit, Option<Choice>), FitError> {
     check_readings(readings)?;
     let said: Vec<Sample> = kept(readings, |i| readings.limits.binary_search(&i).is_err());
+    let is_flown = readings.flown.iter().any(Option::is_some);
+    let choose = if is_flown { crate::choose_flown } else { crate::choose };
     let (model, choice) = choose(&said, region, wish, optics)?;
     let robust = wish.rules.robust;
     let readings = &Readings { robust, ..*readings };

@@ -52,6 +52,8 @@ pub(super) struct LongRun<'a> {
     /// What all samples share, or all of a range or session.
     components: Vec<Component>,
     pub(super) n_samples: usize,
+    /// Whether some of them were taken in flight.
+    is_flown: bool,
     /// Those that carry a flag before anything is fitted.
     n_flagged: usize,
     handing: Handing,
@@ -61,6 +63,21 @@ pub(super) struct LongRun<'a> {
     /// Those that have no part in the fit; each is flagged.
     left_out: TreatedReadings,
     n_excluded: usize,
+}
+
+/// What its readings are handed over for.
+#[derive(Clone, Copy)]
+enum Purpose<'r> {
+    /// A fit by these rules.
+    Fit(&'r Rules),
+    /// A share of more readings, which is looked at once: it takes no limits, and fits nothing along.
+    Share,
+}
+
+impl Purpose<'_> {
+    fn is_share(self) -> bool {
+        matches!(self, Self::Share)
+    }
 }
 
 /// The samples of the block that is looked at, and which of them are used.
@@ -90,7 +107,7 @@ pub(super) fn share(
     reader: &Reader,
     model: Penalised,
 ) -> Result<LongShare, Failure> {
-    let run = LongRun::open_share(&setup.rig, reader)?;
+    let run = LongRun::opened(&setup.rig, reader, Purpose::Share)?;
     let optics = optics(setup);
     let asked = Asked {
         region: fit_region(setup),
@@ -124,15 +141,10 @@ struct Closing {
 
 impl<'a> LongRun<'a> {
     pub(super) fn open(rig: &'a Rig, reader: &'a Reader, rules: &Rules) -> Result<Self, Failure> {
-        Self::opened(rig, reader, Some(rules))
+        Self::opened(rig, reader, Purpose::Fit(rules))
     }
 
-    /// As a share of more readings, which has no rules.
-    fn open_share(rig: &'a Rig, reader: &'a Reader) -> Result<Self, Failure> {
-        Self::opened(rig, reader, None)
-    }
-
-    fn opened(rig: &'a Rig, reader: &'a Reader, rules: Option<&Rules>) -> Result<Self, Failure> {
+    fn opened(rig: &'a Rig, reader: &'a Reader, purpose: Purpose<'_>) -> Result<Self, Failure> {
         let mut look = FirstLook::default();
         each_block(reader, |block| {
             block.iter().try_for_each(|reading| look.take(rig, reading)).map_err(Failure::midway)
@@ -144,22 +156,25 @@ impl<'a> LongRun<'a> {
             for sample in &samples {
                 whole.take(sample);
                 let is_limit = sample.part() == Part::Limit;
-                if sample.part() != Part::None && !(is_limit && rules.is_none()) {
+                if sample.part() != Part::None && !(is_limit && purpose.is_share()) {
                     spread.take(sample);
                 }
             }
             Ok(())
         })?;
         let components = calibration.components(&spread);
-        let handing = match rules {
-            Some(rules) => Handing::new(components, &calibration.references, &spread, rules),
-            None => Handing::of_share(components, &spread),
+        let handing = match purpose {
+            Purpose::Fit(rules) => {
+                Handing::new(components, &calibration.references, &spread, rules)
+            }
+            Purpose::Share => Handing::of_share(components, &spread),
         };
         let mut run = Self {
             reader,
             components: calibration.components(&whole),
             calibration,
             n_samples: 0,
+            is_flown: false,
             n_flagged: 0,
             handing,
             totals: Totals::default(),
@@ -177,6 +192,7 @@ impl<'a> LongRun<'a> {
     fn count(&mut self, block: &[Reading]) {
         let samples = self.calibration.samples(block);
         self.n_samples += samples.len();
+        self.is_flown |= samples.iter().any(|sample| sample.flown().is_some());
         self.n_flagged += samples.iter().filter(|sample| !sample.flags.is_empty()).count();
         let input = self.handing.usable(&samples);
         self.totals.take(&input.readings(&[]));
@@ -216,7 +232,7 @@ impl<'a> LongRun<'a> {
     ) -> Result<LongFit, Stopped> {
         self.handing.demand(&wish.rules)?;
         let samples = self.gleaning.clone().into_samples();
-        let (model, choice) = stream::chosen(&samples, region, wish, optics)?;
+        let (model, choice) = stream::chosen((&samples, self.is_flown), region, wish, optics)?;
         let robust = wish.rules.robust;
         let others = choice.as_ref().map_or_else(Vec::new, fit::Choice::others);
         let region = *region;

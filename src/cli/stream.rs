@@ -129,7 +129,7 @@ impl Scan {
         let noise = self.noise(u_relative);
         let samples = self.gleaning.clone().into_samples().into_iter();
         let samples: Vec<Sample> = samples.map(|sample| known(sample, noise)).collect();
-        let chosen = chosen(&samples, &self.region, wish, optics);
+        let chosen = chosen((&samples, false), &self.region, wish, optics);
         chosen.map_err(|error| {
             // Whose sample is wrong is known by its line to a walk through the file alone.
             let asked = Asked {
@@ -184,13 +184,14 @@ impl Scan {
 
 /// The basis that is pinned, or that these samples ask for: where outliers are weighed, those without them.
 pub(super) fn chosen(
-    samples: &[Sample],
+    (samples, is_flown): (&[Sample], bool),
     region: &Region,
     wish: &Wish,
     optics: Option<&Optics>,
 ) -> Result<(Penalised, Option<Choice>), FitError> {
     if wish.rules.robust == Robust::None || wish.decided().is_some() {
-        return fit::choose(samples, region, wish, optics);
+        let choose = if is_flown { fit::choose_flown } else { fit::choose };
+        return choose(samples, region, wish, optics);
     }
     let rules = Rules { robust: wish.rules.robust, ..Rules::default() };
     let wish = Wish { rules, ..*wish };

@@ -92,6 +92,34 @@ pub fn choose(
     wish: &Wish,
     optics: Option<&Optics>,
 ) -> Result<(Penalised, Option<Choice>), FitError> {
+    choose_read(Taken::AtRest, samples, region, wish, optics)
+}
+
+/// The same for samples that were taken in flight, one after the other along their sweeps: each is a mean over
+/// its way, so that nothing narrow lies between them unseen.
+pub fn choose_flown(
+    samples: &[Sample],
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<(Penalised, Option<Choice>), FitError> {
+    choose_read(Taken::InFlight, samples, region, wish, optics)
+}
+
+/// How samples were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Taken {
+    AtRest,
+    InFlight,
+}
+
+fn choose_read(
+    taken: Taken,
+    samples: &[Sample],
+    region: &Region,
+    wish: &Wish,
+    optics: Option<&Optics>,
+) -> Result<(Penalised, Option<Choice>), FitError> {
     let wish = &wish.in_chart(&region.chart);
     if let Some(model) = wish.decided() {
         return Ok((model, None));
@@ -120,6 +148,7 @@ pub fn choose(
         sweeps = whole.thinned(refining::READINGS_MAX);
         chosen = sweeps.samples_of(samples);
         let mut search = Search::new(&chosen, region, wish, optics, &sweeps, n_lines.is_none());
+        search.taken = taken;
         search.patch_beside(&mut tried)?;
         sort(&mut tried);
     }

@@ -3,7 +3,7 @@
 
 use super::family::Trial;
 use super::search::Search;
-use super::{AngularKind, SweepKind, Wish};
+use super::{AngularKind, SweepKind, Taken, Wish};
 use crate::{Angular, Around, BasisSpec, Fine, FitError, Position, Sample};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -170,8 +170,9 @@ impl Search<'_> {
         });
         let (along, round): (Vec<f64>, Vec<f64>) = within.unzip();
         let theta_max = self.theta_max_rad().min(to) - from;
-        // Along a sweep nothing is left out that would tell how it is between its readings.
-        let between = |kind| if self.kind == kind { SPANS_ALONG } else { SPANS_BETWEEN };
+        // Along a sweep nothing is left out that would tell how it is between readings at rest.
+        let is_untold = |kind| self.kind == kind && self.taken == Taken::AtRest;
+        let between = |kind| if is_untold(kind) { SPANS_ALONG } else { SPANS_BETWEEN };
         let (of_theta, of_phi) = (between(SweepKind::Theta), between(SweepKind::Phi));
         is_dense(along, theta_max, of_theta * theta / parts(fine.halvings))
             && is_dense(round, length, of_phi * phi / parts(fine.around.halvings))
@@ -304,5 +305,5 @@ const COARSE: [(usize, usize); 2] = [(4, 8), (7, 12)];
 /// Readings of a patch lie no further apart than this many of its spans: at two, 24 meridians left a lobe
 /// of 15° that a finer patch follows; four meridians gave a field off by all of it at eight.
 const SPANS_BETWEEN: f64 = 4.0;
-/// The same along a sweep.
+/// The same of readings at rest along a sweep.
 const SPANS_ALONG: f64 = 2.0;

@@ -2,7 +2,7 @@
 //! better, and splines finer in θ where their residuals say so.
 
 use super::family::{Family, Strengths, Trial};
-use super::{AngularKind, SweepKind, Sweeps, Wish, smallest};
+use super::{AngularKind, SweepKind, Sweeps, Taken, Wish, smallest};
 use crate::beam::Optics;
 use crate::grid::Grid;
 use crate::weights::{Model, has_unknown};
@@ -25,6 +25,8 @@ pub(super) struct Search<'s> {
     pub(super) folds: Vec<Vec<usize>>,
     /// What is left out.
     pub(super) kind: SweepKind,
+    /// How readings follow each other along a sweep.
+    pub(super) taken: Taken,
     /// The samples' distinct coordinates.
     grid: Arc<Grid>,
     /// Highest degree in position that places tell apart.
@@ -57,6 +59,7 @@ impl<'s> Search<'s> {
             strengths: wish.strengths(scale_min),
             folds: sweeps.folds(FOLDS, one_by_one),
             kind: sweeps.kind,
+            taken: Taken::AtRest,
             position_most: distinct.saturating_sub(1),
             grid: Arc::new(grid),
             coefficients_max: most.min(samples.len()),
