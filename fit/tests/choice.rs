@@ -270,20 +270,25 @@ fn what_is_narrow_both_ways_is_followed_in_a_patch() {
 fn no_patch_is_much_finer_than_readings_along_a_sweep() {
     let field: Field = |ray| 0.2 * libm::cos(ray.theta_rad) + lobe(ray, 1300.0, 30.0, 101.0);
     let samples = noisy(&raster_rays(&CONE, 21, 36, 1), field, 0.002, &mut Die::new(7));
-    let (_, choice) = fitted(&samples, &CONE);
     let step_deg = CONE.theta_max_rad.to_degrees() / 20.0;
-    let mut patches = 0;
-    for candidate in &choice.candidates {
-        let Angular::Splines { theta_spans, fine, .. } = candidate.model.basis.angular else {
-            continue;
+    // Of each patch how many of its spans lie between readings of a sweep.
+    let spans_between = |choice: &fit::Choice| -> Vec<f64> {
+        let of = |candidate: &fit::Candidate| match candidate.model.basis.angular {
+            Angular::Splines { theta_spans, fine, .. } if !fine.around.is_none() => {
+                Some(step_deg / 90.0 * (theta_spans << fine.halvings) as f64)
+            }
+            _ => None,
         };
-        if !fine.around.is_none() {
-            let narrowest_deg = 90.0 / (theta_spans << fine.halvings) as f64;
-            assert!(step_deg <= 2.0 * narrowest_deg, "{candidate:?}");
-            patches += 1;
-        }
-    }
-    assert!(patches > 2);
+        choice.candidates.iter().filter_map(of).collect()
+    };
+    let (_, choice) = fitted(&samples, &CONE);
+    let at_rest = spans_between(&choice);
+    assert!(at_rest.len() > 2 && at_rest.iter().all(|spans| *spans <= 2.0), "{at_rest:?}");
+    // In flight nothing lies between them.
+    let flown = fit::choose_flown(&samples, &CONE, &Wish::default(), None).unwrap().1.unwrap();
+    let flown = spans_between(&flown);
+    assert!(flown.iter().any(|spans| *spans > 2.0), "{flown:?}");
+    assert!(flown.iter().all(|spans| *spans <= 4.0), "{flown:?}");
 }
 
 /// Many functions of the position leave no room for splines in direction: no patch, and no refusal.
