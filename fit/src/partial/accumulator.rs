@@ -35,9 +35,9 @@ impl Accumulator {
         Ok(Self { partial, optics })
     }
 
-    /// As if asked for before the first reading: what readings say of finer functions, so that the fit's u holds what
-    /// its own can't follow (see [`Fit::with_truncation`](crate::Fit::with_truncation)). Rows are then up to 480 numbers
-    /// longer than those of the fit's functions alone; nothing where no finer functions are looked for.
+    /// The same that keeps what readings say of finer functions, too, so that the u of the fit holds what its
+    /// own can't follow, as by [`Fit::with_truncation`](crate::Fit::with_truncation). Rows are then up to 480 numbers longer. Where that
+    /// looks for no finer functions, nothing is kept.
     ///
     /// # Panics
     /// When a reading was taken in before.

@@ -195,10 +195,14 @@ impl Partial {
             .ok_or_else(|| malformed("whereabouts"))?;
         let finer = match parts.finer {
             None => None,
-            Some(FinerParts { common, numbers }) => Some(
-                Remembered::stored(&numbers, &basis, common)?
-                    .ok_or_else(|| malformed("finer functions"))?,
-            ),
+            Some(FinerParts { common, numbers }) => {
+                // Room is made for each: no more than the triangle has.
+                let is_known = common.iter().all(|name| parts.common.contains(name));
+                let is_sound = is_known && common.len() <= parts.common.len();
+                let stored = is_sound.then(|| Remembered::stored(&numbers, &basis, common));
+                let stored = stored.transpose()?.flatten();
+                Some(stored.ok_or_else(|| malformed("finer functions"))?)
+            }
         };
         Ok(Self {
             whereabouts,

@@ -296,7 +296,8 @@ fn shares_with_and_without_finer_functions_are_not_merged() {
     let parts = merged.parts();
     let cut = |parts: &mut FinerParts| parts.numbers.truncate(900);
     let impossible = |parts: &mut FinerParts| parts.numbers[3] = 2.0;
-    for change in [&cut as &dyn Fn(&mut FinerParts), &impossible] {
+    let unheard_of = |parts: &mut FinerParts| parts.common.push("moon".to_owned());
+    for change in [&cut as &dyn Fn(&mut FinerParts), &impossible, &unheard_of] {
         let mut wrong = parts.clone();
         change(wrong.finer.as_mut().unwrap());
         assert!(matches!(Partial::from_parts(wrong), Err(FitError::Parts { .. })));
