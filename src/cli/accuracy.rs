@@ -48,10 +48,13 @@ pub(super) fn course(
         let last = known.samples.iter().map(|sample| sample.time_s + sample.dwell_s);
         let fit = if count == total {
             whole.clone()
-        } else if is_point(&known.fit_as(region, chosen.model, rules, None).ok()?.fit) {
-            known.fit_known(region, &chosen, rules, optics).ok()?
         } else {
-            return None;
+            // A penalty makes a point of any.
+            let is_open = chosen.model.penalty.is_none();
+            if is_open && !is_point(&known.fit_as(region, chosen.model, rules, None).ok()?.fit) {
+                return None;
+            }
+            known.fit_known(region, &chosen, rules, optics).ok()?
         };
         point(&fit, last.fold(0.0, f64::max), count)
     };

@@ -58,7 +58,9 @@ pub enum PartialFileError {
     #[error("no partial fit: expected a file that begins with \"gonio-pf\"")]
     Foreign,
     /// Write it again with this program.
-    #[error("version {found} of partial fits; expected {VERSION}")]
+    #[error(
+        "version {found} of partial fits; expected {VERSION}: write it again with this program"
+    )]
     Version {
         /// As the file says.
         found: u32,
