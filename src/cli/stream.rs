@@ -195,7 +195,10 @@ pub(super) fn chosen(
     }
     let rules = Rules { robust: wish.rules.robust, ..Rules::default() };
     let wish = Wish { rules, ..*wish };
-    fit::fit_wished(&Readings::of(samples), region, &wish, optics)
+    // Their ways are not kept; that they had some counts here.
+    let way = |sample: &Sample| is_flown.then_some((sample.ray, sample.ray));
+    let flown: Vec<Option<(Ray, Ray)>> = samples.iter().map(way).collect();
+    fit::fit_valued(&Readings { flown: &flown, ..Readings::of(samples) }, region, &wish, optics)
         .map(|ruled| (ruled.fit.model(), ruled.choice))
 }
 
