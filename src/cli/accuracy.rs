@@ -1,8 +1,11 @@
 //! How the uncertainty of a run's exitance came down with rig time: fits of the readings taken first, ever
 //! more of them. It does not know where the curve is written or drawn.
 
-use fit::{Choice, Chosen, Fit, Optics, Penalised, Region, Rules};
+use fit::{Choice, Chosen, Fit, Optics, Penalised, Region, Ruled, Rules};
 
+use super::failure::Failure;
+use super::long_run::LongRun;
+use super::stream::Stopped;
 use crate::export::AccuracyPoint;
 use crate::rig::calibration::{Calibrated, Fitted};
 
@@ -26,11 +29,7 @@ pub(super) fn course(
     optics: Option<&Optics>,
 ) -> Vec<AccuracyPoint> {
     let whole = &fitted.fit;
-    let chosen = fitted.choice.as_ref().and_then(Choice::chosen);
-    let chosen = chosen.unwrap_or_else(|| {
-        let model = Penalised::new(whole.basis(), whole.penalty());
-        Chosen { model, others: Vec::new() }
-    });
+    let chosen = chosen(whole, fitted.choice.as_ref());
     let total = calibrated.samples.len();
     let mut counts: Vec<usize> = (0..POINTS_MAX)
         .map(|k| (total as f64 * libm::exp2(-0.5 * f64::from(k))).round())
@@ -61,8 +60,41 @@ pub(super) fn course(
     counts.into_iter().filter_map(after).collect()
 }
 
+/// The same of a run that is read in blocks: a quarter of the readings of a point and half of them are two
+/// more, so that all of them take as long as the whole did.
+pub(super) fn course_in_blocks(
+    run: &LongRun<'_>,
+    (region, optics): (&Region, Option<&Optics>),
+    whole: &Ruled,
+    rules: &Rules,
+) -> Result<Vec<AccuracyPoint>, Failure> {
+    let chosen = chosen(&whole.fit, whole.choice.as_ref());
+    let mut points: Vec<AccuracyPoint> = Vec::new();
+    points.extend(point(&whole.fit, run.ended_s, run.n_samples));
+    let mut until = run.n_readings;
+    for _ in 1..POINTS_MAX {
+        until /= 2;
+        let known = run.first(until, rules)?;
+        let made = match known.fit_known(region, optics, &chosen, rules) {
+            Ok(made) => made,
+            // Too few readings for the functions; so are fewer.
+            Err(Stopped::Fit(_)) => break,
+            Err(Stopped::Source(failure)) => return Err(failure),
+        };
+        points.extend(point(&made.ruled.fit, known.ended_s, known.n_samples));
+    }
+    points.reverse();
+    Ok(points)
+}
+
+/// What all points are fitted in.
+fn chosen(whole: &Fit, choice: Option<&Choice>) -> Chosen {
+    let model = || Penalised::new(whole.basis(), whole.penalty());
+    choice.and_then(Choice::chosen).unwrap_or_else(|| model().into())
+}
+
 /// The point of a fit of so many readings; none of a fit that rests on what its poses hardly determine.
-pub(super) fn point(fit: &Fit, rig_s: f64, readings: usize) -> Option<AccuracyPoint> {
+fn point(fit: &Fit, rig_s: f64, readings: usize) -> Option<AccuracyPoint> {
     let (exitance, flux, readings) = (fit.exitance(), fit.flux(), readings as u64);
     is_point(fit).then_some(AccuracyPoint { rig_s, readings, exitance, flux })
 }

@@ -19,8 +19,6 @@ use crate::rig::{Reading, ReadingKind};
 
 /// Samples that pictures show at most, about: more dots are one blot.
 const SHOWN_MAX: usize = 20_000;
-const ONE_POINT: &str =
-    "accuracy.csv has the whole run alone: what parts of it reached takes all samples at once";
 
 /// What the results of a run in blocks have instead of its samples.
 #[derive(Debug)]
@@ -72,14 +70,15 @@ impl Results {
         reader: &Reader,
     ) -> Result<(Self, Vec<Reading>), Failure> {
         let run = LongRun::open(&setup.rig, reader, &wish.rules)?;
-        let made = match run.fit_wished(&fit_region(setup), optics(setup).as_ref(), wish) {
+        let (region, optics) = (fit_region(setup), optics(setup));
+        let made = match run.fit_wished(&region, optics.as_ref(), wish) {
             Ok(made) => Ok(made),
             Err(Stopped::Fit(error)) => Err(error),
             Err(Stopped::Source(failure)) => return Err(failure),
         };
         let fit = made.as_ref().ok().map(|made| &made.ruled.fit);
-        let Kept { tally, samples, others } = keep(&run, fit, optics(setup).as_ref())?;
-        let compared = fit.and_then(|fit| compare(setup, &fit_region(setup), fit));
+        let Kept { tally, samples, others } = keep(&run, fit, optics.as_ref())?;
+        let compared = fit.and_then(|fit| compare(setup, &region, fit));
         let (truth, score) = compared.unzip();
         let derived = fit.map_or_else(Vec::new, |fit| {
             derive::derive(fit, setup.rig.detector.quantity, &setup.plan.derive)
@@ -87,8 +86,13 @@ impl Results {
         let blocks = made
             .as_ref()
             .map_or_else(|_| InBlocks::without_fit(), |made| InBlocks::of(made, wish.rules.robust));
-        let point = fit.and_then(|fit| accuracy::point(fit, tally.ended_s, tally.measured));
-        let accuracy = point.into_iter().collect();
+        let accuracy = match &made {
+            Ok(made) => {
+                let (seen, whole) = ((&region, optics.as_ref()), &made.ruled);
+                accuracy::course_in_blocks(&run, seen, whole, &wish.rules)?
+            }
+            Err(_) => Vec::new(),
+        };
         let independent =
             made.as_ref().map_or(IndependentParts::NONE, |made| made.independent.clone());
         let levels = samples.iter().filter_map(|(_, level)| *level).collect();
@@ -113,7 +117,6 @@ impl Results {
         let Some(blocks) = &self.blocks else { return Vec::new() };
         let (shown, all) = (self.calibrated.samples.len(), self.tally.measured);
         let mut remarks = blocks.notes.to_vec();
-        remarks.push(ONE_POINT.to_owned());
         if shown < all {
             remarks.push(format!(
                 "pictures and the table of flagged readings are of {shown} samples of {all}; samples.csv has all"

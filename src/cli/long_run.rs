@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use fit::blocks::{Asked, Blocks, Blockwise, Totals};
 use fit::partial::Partial;
 use fit::{
-    FitError, Gleaning, Optics, Penalised, Readings, Region, Resolves, Robust, Ruled, Rules, Wish,
+    Chosen, FitError, Gleaning, Optics, Penalised, Readings, Region, Resolves, Robust, Ruled, Rules, Wish,
 };
 
 use super::failure::Failure;
@@ -48,10 +48,16 @@ pub(super) struct LongFit {
 /// A journal, and what three looks at it found.
 pub(super) struct LongRun<'a> {
     reader: &'a Reader,
+    /// Readings of it that count, in the order in which they were taken.
+    until: u64,
     pub(super) calibration: Calibration<'a>,
     /// What all samples share, or all of a range or session.
     components: Vec<Component>,
     pub(super) n_samples: usize,
+    /// With dark and reference readings.
+    pub(super) n_readings: u64,
+    /// When the last of them had been taken, in run time, seconds.
+    pub(super) ended_s: f64,
     /// Whether some of them were taken in flight.
     is_flown: bool,
     /// Those that carry a flag before anything is fitted.
@@ -146,12 +152,28 @@ impl<'a> LongRun<'a> {
 
     fn opened(rig: &'a Rig, reader: &'a Reader, purpose: Purpose<'_>) -> Result<Self, Failure> {
         let mut look = FirstLook::default();
-        each_block(reader, |block| {
+        each_block(reader, u64::MAX, |block| {
             block.iter().try_for_each(|reading| look.take(rig, reading)).map_err(Failure::midway)
         })?;
         let calibration = look.calibration(rig).map_err(Failure::midway)?;
+        Self::calibrated_by(calibration, reader, u64::MAX, purpose)
+    }
+
+    /// Its first readings alone, by the dark levels and the reference readings of all.
+    pub(super) fn first(&self, until: u64, rules: &Rules) -> Result<Self, Failure> {
+        let calibration = self.calibration.clone();
+        Self::calibrated_by(calibration, self.reader, until, Purpose::Fit(rules))
+    }
+
+    /// The second look, at what samples say, and the third, at those that a fit uses.
+    fn calibrated_by(
+        calibration: Calibration<'a>,
+        reader: &'a Reader,
+        until: u64,
+        purpose: Purpose<'_>,
+    ) -> Result<Self, Failure> {
         let (mut spread, mut whole) = (Spread::default(), Spread::default());
-        each_block::<Failure>(reader, |block| {
+        each_block::<Failure>(reader, until, |block| {
             let samples = calibration.samples(block);
             for sample in &samples {
                 whole.take(sample);
@@ -171,9 +193,12 @@ impl<'a> LongRun<'a> {
         };
         let mut run = Self {
             reader,
+            until,
             components: calibration.components(&whole),
             calibration,
             n_samples: 0,
+            n_readings: 0,
+            ended_s: 0.0,
             is_flown: false,
             n_flagged: 0,
             handing,
@@ -182,7 +207,7 @@ impl<'a> LongRun<'a> {
             left_out: TreatedReadings::default(),
             n_excluded: 0,
         };
-        each_block::<Failure>(reader, |block| {
+        each_block::<Failure>(reader, until, |block| {
             run.count(block);
             Ok(())
         })?;
@@ -191,7 +216,10 @@ impl<'a> LongRun<'a> {
 
     fn count(&mut self, block: &[Reading]) {
         let samples = self.calibration.samples(block);
+        self.n_readings += block.len() as u64;
         self.n_samples += samples.len();
+        let ends_s = samples.iter().map(|sample| sample.time_s + sample.dwell_s);
+        self.ended_s = ends_s.fold(self.ended_s, f64::max);
         self.is_flown |= samples.iter().any(|sample| sample.flown().is_some());
         self.n_flagged += samples.iter().filter(|sample| !sample.flags.is_empty()).count();
         let input = self.handing.usable(&samples);
@@ -217,7 +245,7 @@ impl<'a> LongRun<'a> {
 
     /// Hands its readings over, as they were taken, block by block.
     pub(super) fn each(&self, mut take: impl FnMut(&[Reading])) -> Result<(), Failure> {
-        each_block::<Failure>(self.reader, |block| {
+        each_block::<Failure>(self.reader, self.until, |block| {
             take(block);
             Ok(())
         })
@@ -233,16 +261,34 @@ impl<'a> LongRun<'a> {
         self.handing.demand(&wish.rules)?;
         let samples = self.gleaning.clone().into_samples();
         let (model, choice) = stream::chosen((&samples, self.is_flown), region, wish, optics)?;
-        let robust = wish.rules.robust;
         let others = choice.as_ref().map_or_else(Vec::new, fit::Choice::others);
-        let region = *region;
-        let asked = Asked { region, model, robust, optics, with_truncation: true, others: &others };
+        let made = self.fit_known(region, optics, &Chosen { model, others }, &wish.rules)?;
+        Ok(LongFit { ruled: Ruled { choice, ..made.ruled }, ..made })
+    }
+
+    /// Fits it in a basis that is known, by a plan's or a person's rules.
+    pub(super) fn fit_known(
+        &self,
+        region: &Region,
+        optics: Option<&Optics>,
+        chosen: &Chosen,
+        rules: &Rules,
+    ) -> Result<LongFit, Stopped> {
+        let Chosen { model, others } = chosen;
+        let asked = Asked {
+            region: *region,
+            model: *model,
+            robust: rules.robust,
+            optics,
+            with_truncation: true,
+            others,
+        };
         let (Blockwise { fit, nuisances, resolves }, closing) = self.fit(&asked)?;
-        let ruled = fit.clone().ruled(&wish.rules)?;
+        let ruled = fit.clone().ruled(rules)?;
         let is_as_fitted = ruled.fit.coefficients() == fit.coefficients();
         let independent = closing.sums.parts(&ruled.fit);
         Ok(LongFit {
-            ruled: Ruled { choice, ..ruled },
+            ruled,
             resolves,
             drift: self.handing.drift.clone(),
             nuisances,
@@ -300,7 +346,7 @@ impl Blocks for Walk<'_> {
         &mut self,
         take: &mut dyn FnMut(&Readings<'_>) -> Result<(), FitError>,
     ) -> Result<(), Stopped> {
-        each_block(self.run.reader, |readings| {
+        each_block(self.run.reader, self.run.until, |readings| {
             let samples = self.run.calibration.samples(readings);
             let input = self.run.handing.usable(&samples);
             let flown: Vec<_> = input.places.iter().map(|i| samples[*i].flown()).collect();
@@ -318,16 +364,19 @@ impl Blocks for Walk<'_> {
     }
 }
 
-/// Hands the readings of a journal on, as they were taken.
+/// Hands a journal's first readings on, as they were taken.
 fn each_block<E: From<Failure>>(
     reader: &Reader,
+    until: u64,
     mut take: impl FnMut(&[Reading]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut last = 0;
+    let (mut last, mut left) = (0, until);
     loop {
-        let block = reader.readings_after(last, BLOCK_READINGS).map_err(Failure::from)?;
+        let count = u32::try_from(left).map_or(BLOCK_READINGS, |left| left.min(BLOCK_READINGS));
+        let block = reader.readings_after(last, count).map_err(Failure::from)?;
         let Some((position, _)) = block.last() else { return Ok(()) };
         last = *position;
+        left -= block.len() as u64;
         let readings: Vec<Reading> = block.into_iter().map(|(_, reading)| reading).collect();
         take(&readings)?;
     }
