@@ -21,6 +21,7 @@ use crate::solve::{
 use crate::weights::{Model, PASSES_MAX, REWEIGHING_MAX, Settled, moved, start};
 use crate::{BasisSpec, Common, FitError, Penalised, Penalty, Readings, Region, Robust};
 use crate::{Fit, Parts};
+use faer::Mat;
 use std::sync::Arc;
 
 mod factor;
@@ -170,9 +171,14 @@ fn solve(
 ) -> Result<Solved, FitError> {
     let p = design.basis().len();
     let zeros = vec![vec![0.0; p]; 1 + sides.len()];
-    let mut gram = Gram::new(p, 0);
-    let first = pass(design, rows, sides, &zeros, |row| gram.absorb(row, &[]))?;
-    let (mut columns, _) = gram.finish();
+    // Without a prior they determine all.
+    let mut signs = vec![0.0; if prior.is_none() { 0 } else { PROBES }];
+    let (mut gram, mut dice) = (Gram::new(p, signs.len()), Signs(1));
+    let first = pass(design, rows, sides, &zeros, |row| {
+        signs.fill_with(|| dice.next());
+        gram.absorb(row, &signs);
+    })?;
+    let (mut columns, probed) = gram.finish();
     if prior.is_none()
         && let Some(refused) = unmeasured(&columns, design.basis())
     {
@@ -215,7 +221,7 @@ fn solve(
     if !unknowns.iter().flatten().all(|x| x.is_finite()) {
         return Err(FitError::OutOfRange);
     }
-    let determined = determined(&factor, prior);
+    let determined = if prior.is_none() { p as f64 } else { determined(&factor, &probed) };
     Ok(Solved { factor, unknowns, determined })
 }
 
@@ -255,29 +261,24 @@ fn pass(
     Ok(products)
 }
 
-/// All coefficients less λ tr(P C), by vectors of random signs: to about √(2/`PROBES`) of the root of
-/// what comes out.
-fn determined(factor: &Factor, prior: &Prior) -> f64 {
-    let all = factor.len() as f64;
-    if prior.is_none() {
-        return all;
+/// tr(A C Aᵀ): how many coefficients the rows determine, by vectors of random signs over the rows whose
+/// products with Aᵀ these are. Off by about √(2/`PROBES`) of its root, never more than there are rows, since
+/// no eigenvalue of A C Aᵀ exceeds 1.
+fn determined(factor: &Factor, probed: &Mat<f64>) -> f64 {
+    let count = probed.ncols();
+    let sum: f64 = (0..count).map(|k| factor.variance(probed.col_as_slice(k))).sum();
+    (sum / count as f64).clamp(1.0, factor.len() as f64)
+}
+
+/// Signs of equal odds, the same ones each time.
+struct Signs(u64);
+
+impl Signs {
+    fn next(&mut self) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        if self.0 >> 63 == 0 { 1.0 } else { -1.0 }
     }
-    let mut state = 1_u64;
-    let mut sum = 0.0;
-    for _ in 0..PROBES {
-        let signs: Vec<f64> = (0..factor.len())
-            .map(|_| {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                if state >> 63 == 0 { 1.0 } else { -1.0 }
-            })
-            .collect();
-        let mut solved = signs.clone();
-        factor.solve(&mut solved);
-        sum += crate::basis::dot(&prior.apply(&signs), &solved);
-    }
-    (all - sum / f64::from(PROBES)).clamp(1.0, all)
 }
 
 /// Functions that no reading meets.
@@ -328,7 +329,7 @@ const REFINEMENTS: usize = 4;
 const ROUNDING: f64 = 1e-14;
 const SOLVED: f64 = 1e-9;
 /// Vectors of random signs.
-const PROBES: u32 = 48;
+const PROBES: usize = 48;
 /// Lifts a matrix without a factor just enough to have one.
 const RIDGE: f64 = 1e-9;
 /// Rows of a worse condition leave no digit of their products.

@@ -115,6 +115,22 @@ fn a_penalised_fit_equals_the_dense_one_and_its_determined_part_is_close() {
     }
 }
 
+/// Readings of little noise determine as many coefficients as they are, never more.
+#[test]
+fn few_readings_determine_no_more_than_they_are() {
+    let samples = samples(30, Noise::Fixed { variance: 1e-6 });
+    let penalty = Penalty { power: 1.0, strength: 1e-3 };
+    for position in [Position::Legendre { degree: 1 }, Position::Legendre { degree: 2 }] {
+        let model = Penalised::new(basis(position), penalty);
+        assert!(model.basis.len() > samples.len());
+        let dense = crate::fit(&samples, &REGION, model, &[]).unwrap();
+        let sparse = fit(&samples, model, &[]).unwrap();
+        let (a, b) = (dense.determined(), sparse.determined());
+        assert!(b <= samples.len() as f64, "{b} of {}", samples.len());
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+}
+
 #[test]
 fn what_no_reading_meets_is_named_and_so_is_what_is_not_told_apart() {
     let noise = Noise::Fixed { variance: 0.01 };
