@@ -252,7 +252,8 @@ impl Fit {
         })
     }
 
-    fn factor_matrix(&self) -> Mat<f64> {
+    /// S of the coefficients' covariance, upper triangular.
+    pub(crate) fn factor_matrix(&self) -> Mat<f64> {
         let factor = &self.parts().factor;
         let p = self.coefficients().len();
         Mat::from_fn(p, p, |i, j| if i <= j { factor[j * (j + 1) / 2 + i] } else { 0.0 })

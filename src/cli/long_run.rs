@@ -7,7 +7,8 @@ use std::cell::RefCell;
 use fit::blocks::{Asked, Blocks, Blockwise, Totals};
 use fit::partial::Partial;
 use fit::{
-    Chosen, FitError, Gleaning, Optics, Penalised, Readings, Region, Resolves, Robust, Ruled, Rules, Wish,
+    Chosen, FitError, Gleaning, Optics, Penalised, Readings, Region, Resolves, Robust, Ruled,
+    Rules, Wish,
 };
 
 use super::failure::Failure;

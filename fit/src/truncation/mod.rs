@@ -22,7 +22,9 @@
 //! Where finer functions make the readings no likelier there is no truncation to speak of, and the
 //! fit stays as it is. What is finer than all readings nothing here can know.
 
+mod between;
 mod heard;
+mod left_out;
 mod likeliest;
 mod look;
 mod remembered;

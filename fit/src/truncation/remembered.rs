@@ -13,8 +13,9 @@ use faer::Mat;
 use glam::DVec3;
 
 use super::heard::Heard;
+use super::left_out::{Group, LeftOut};
 use super::look::{Look, Rows};
-use super::uneven::{CELLS_A_UNIT, CELLS_MAX, Group, Uneven, cell};
+use super::uneven::{CELLS_A_UNIT, CELLS_MAX, cell};
 use super::wider::{Noise, SCALE_MOST, Widened, Wider};
 use super::{Finer, most_of_position};
 use crate::basis::{Basis, dot};
@@ -99,7 +100,7 @@ impl Remembered {
         }
         let noise = (is_unknown, f64::from(u8::from(is_beyond)));
         let wider = Wider::of_shares(fit, finer, &names, noise)?;
-        wider.concluded(look, |noise, solution| Ok(groups.uneven(noise, solution)))
+        wider.concluded(look, |noise, solution| Ok(groups.left_out(noise, solution, u_factor)))
     }
 
     fn columns(&self) -> usize {
@@ -264,8 +265,9 @@ impl Groups {
         self.columns = is_kept.iter().filter(|is_kept| **is_kept).count();
     }
 
-    /// How far they lie off what all others foretell of them; `solution` is of all rows and priors.
-    fn uneven(&self, noise: Noise, solution: &Solution) -> Uneven {
+    /// What all others foretell of them; `solution` is of all rows and priors, and the fit took readings to
+    /// scatter by `u_factor` more than their rows were told.
+    fn left_out(&self, noise: Noise, solution: &Solution, u_factor: f64) -> LeftOut {
         let unknowns = solution.unknowns(0);
         let mut rows = Mat::zeros(self.columns, self.cells.len());
         let mut groups = Vec::with_capacity(self.cells.len());
@@ -274,12 +276,15 @@ impl Groups {
             mean.iter_mut().zip(&sums.row).for_each(|(mean, sum)| *mean = sum / sums.count);
             groups.push(Group {
                 count: sums.count,
-                variances: noise.scale * sums.variances,
+                found: u_factor * u_factor * sums.variances,
+                stated: sums.variances,
                 residual: sums.values / sums.count - dot(mean, &unknowns),
                 towards: sums.direction(),
             });
         }
-        Uneven::of(&groups, &rows, &solution.inverse_matrix())
+        // Their rows know of these variances alone.
+        let noise = Noise { is_stated: true, ..noise };
+        LeftOut::of(groups, rows, &solution.inverse_matrix(), noise)
     }
 
     fn put(&self, out: &mut Vec<f64>) {

@@ -6,6 +6,7 @@
 //! It does not know where the field is rough between readings that all others foretell well.
 
 use super::heard::{Heard, Walks, direction};
+use super::left_out::{Group, LeftOut};
 use super::wider::{Noise, Wider};
 use crate::Symmetry;
 use crate::basis::dot;
@@ -31,23 +32,9 @@ struct Cell {
 }
 
 impl Uneven {
-    /// Of groups of readings with their mean rows, one a column; `factor` is S of the unknowns' covariance.
-    pub(super) fn of(groups: &[Group], rows: &Mat<f64>, factor: &Mat<f64>) -> Self {
-        let mut cells = Vec::with_capacity(groups.len());
-        for (k, some) in groups.chunks(ROWS).enumerate() {
-            let fitted = factor.transpose() * rows.as_ref().subcols(k * ROWS, some.len());
-            cells.extend(some.iter().enumerate().map(|(j, group)| {
-                let Group { count, variances, residual, towards } = *group;
-                let variance = variances / (count * count);
-                // What is left of a value beside the others is its residual over this part, with the
-                // variance over it.
-                let known = dot(fitted.col_as_slice(j), fitted.col_as_slice(j)) / variance;
-                let part = (1.0 - known).max(PART_LEAST);
-                let ratio = residual * residual / (variance * part);
-                Cell { towards: towards.normalize_or(DVec3::Z), ratio }
-            }));
-        }
-        Self { cells, symmetry: None }
+    pub(super) fn of(left_out: &LeftOut) -> Self {
+        let cells = left_out.ratios().map(|(towards, ratio)| Cell { towards, ratio });
+        Self { cells: cells.collect(), symmetry: None }
     }
 
     /// What the variance of all that is missed along a ray is to be multiplied by: the mean ratio of the
@@ -110,22 +97,21 @@ fn folded(symmetry: Option<Symmetry>, towards: DVec3) -> DVec3 {
 }
 
 impl Wider<'_> {
-    /// How far readings lie off what all others foretell of them, under the likeliest model; `solution`
-    /// is of all rows and priors.
-    pub(super) fn uneven<W: Walks>(
+    /// What all others foretell of readings under the likeliest model; `solution` is of all rows and priors.
+    pub(super) fn left_out<W: Walks>(
         &self,
         walks: &mut W,
         noise: Noise,
         directions: &Directions,
         solution: &Solution,
-    ) -> Result<Uneven, W::Error> {
+    ) -> Result<LeftOut, W::Error> {
         let (unknowns, factor) = (solution.unknowns(0), solution.inverse_matrix());
         let mut means = Means::new(directions, &unknowns);
         walks.each(&mut |heard| {
-            means.take(heard, noise, self.kept());
+            means.take(heard, self.kept());
             Ok(())
         })?;
-        Ok(Uneven::of(&means.groups, &means.rows, &factor))
+        Ok(LeftOut::of(means.groups, means.rows, &factor, noise))
     }
 }
 
@@ -174,16 +160,6 @@ pub(super) fn cell(cells_a_unit: f64, towards: DVec3) -> [i32; 3] {
     cell.map(|index| index as i32)
 }
 
-/// Readings of one direction together.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Group {
-    pub(super) count: f64,
-    pub(super) variances: f64,
-    /// What they lie off the model on average.
-    pub(super) residual: f64,
-    pub(super) towards: DVec3,
-}
-
 /// Means over readings of one direction.
 struct Means<'w> {
     cells_a_unit: f64,
@@ -201,7 +177,8 @@ impl<'w> Means<'w> {
         let (cells_a_unit, counts) = directions.finest();
         let none = |count: &f64| Group {
             count: *count,
-            variances: 0.0,
+            found: 0.0,
+            stated: 0.0,
             residual: 0.0,
             towards: DVec3::ZERO,
         };
@@ -215,7 +192,7 @@ impl<'w> Means<'w> {
         }
     }
 
-    fn take(&mut self, heard: &Heard<'_>, noise: Noise, kept: &[usize]) {
+    fn take(&mut self, heard: &Heard<'_>, kept: &[usize]) {
         let mut rooms = heard.rooms();
         for i in (0..heard.values.len()).filter(|i| heard.is_plain(*i)) {
             let towards = heard.towards(i);
@@ -226,7 +203,8 @@ impl<'w> Means<'w> {
             let group = &mut self.groups[at];
             let part = 1.0 / group.count;
             group.residual += part * (heard.values[i] - dot(&self.row, self.unknowns));
-            group.variances += noise.scale * heard.variance(i, noise.is_stated);
+            group.found += heard.variance(i, false);
+            group.stated += heard.variance(i, true);
             group.towards += towards;
             let mean = self.rows.col_as_slice_mut(at);
             mean.iter_mut().zip(&self.row).for_each(|(mean, value)| *mean += part * value);
@@ -239,15 +217,11 @@ const NEAREST: usize = 4;
 /// Of the squared distance of the farthest of these what is added to each one's: a direction that
 /// was measured is told of by its own readings nearly alone.
 const OWN: f64 = 1.0 / 16.0;
-/// Of readings that nothing else says anything of not less than this part is left.
-const PART_LEAST: f64 = 1e-6;
 /// About a quarter of a degree, and more where directions are more than this.
 pub(super) const CELLS_A_UNIT: f64 = 200.0;
 pub(super) const CELLS_MAX: usize = 2000;
 /// Cells half as fine, and so on, of which the last are fewer than this on all the sphere.
 const FINENESSES: i32 = 6;
-/// Rows at a time.
-const ROWS: usize = 256;
 
 #[cfg(test)]
 mod tests {

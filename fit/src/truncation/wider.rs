@@ -2,6 +2,7 @@
 //! under noise as it is stated or as the fit took it; and what the likeliest says of the fit.
 
 use super::heard::{Taken, Walks};
+use super::left_out::LeftOut;
 use super::likeliest::{Hold, Likeliest, POWER, Shares};
 use super::look::{Look, Rows};
 use super::uneven::{Directions, Uneven};
@@ -128,6 +129,15 @@ impl<'f> Wider<'f> {
         })
     }
 
+    pub(super) fn fit(&self) -> &Fit {
+        self.fit
+    }
+
+    /// Whether nothing was stated of some readings' noise.
+    pub(super) fn has_unknown(&self) -> bool {
+        self.has_unknown
+    }
+
     /// What finer functions are of.
     pub(crate) fn beyond(&self) -> &Basis {
         &self.beyond
@@ -162,14 +172,14 @@ impl<'f> Wider<'f> {
             directions.take(heard);
             look.take(heard, &self.kept, |_, _| {})
         })?;
-        self.concluded(look, |noise, solution| self.uneven(walks, noise, &directions, solution))
+        self.concluded(look, |noise, solution| self.left_out(walks, noise, &directions, solution))
     }
 
-    /// What one look at all readings says, and where more is missed than elsewhere, as `uneven` finds out.
+    /// What one look at all readings says, and what of each all others foretell, as `left_out` finds out.
     pub(super) fn concluded<E: From<FitError>>(
         &self,
         look: Look,
-        uneven: impl FnOnce(Noise, &Solution) -> Result<Uneven, E>,
+        left_out: impl FnOnce(Noise, &Solution) -> Result<LeftOut, E>,
     ) -> Result<Option<Widened>, E> {
         let (scatter, plain) = (look.scatter, look.plain);
         let (joint, Priors { likeliest: found, other }) = self.likeliest(look)?;
@@ -187,11 +197,13 @@ impl<'f> Wider<'f> {
         let inflated = factor.iter().map(|value| inflation * value).collect();
         let mut parts = Parts { factor: inflated, ..self.fit.parts().clone() };
         if is_wider {
-            let uneven = uneven(noise, &solution)?;
+            let left_out = left_out(noise, &solution)?;
+            let uneven = Uneven::of(&left_out);
             let mut missed = self.missed(&solution, &whole);
             if let Some(other) = other {
                 self.mix(&mut missed, &joint, (&found, &other))?;
             }
+            missed.extend(self.between(&left_out));
             let beyond = self.beyond.spec();
             parts.truncation = Some(Truncation { beyond, missed, gain: found.gain, uneven });
             let all = scatter[usize::from(noise.is_stated)];
