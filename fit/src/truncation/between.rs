@@ -31,9 +31,9 @@ fn changes(factor: &Mat<f64>, left_out: &LeftOut, is_unknown: bool) -> Vec<Vec<f
     let mut triangle = Triangle::new(p, 0);
     let (mut all, mut unexplained) = (0.0, 0.0);
     let mut change = vec![0.0; p];
-    for ((j, group), (missed, part)) in left_out.groups.iter().enumerate().zip(left_out.missed()) {
+    for ((j, group), (missed, held)) in left_out.groups.iter().enumerate().zip(left_out.missed()) {
         all += missed * missed;
-        unexplained += missed * missed - left_out.noise_variance(group, is_unknown) / part;
+        unexplained += missed * missed - held * left_out.noise_variance(group, is_unknown);
         let weighted = missed * group.weight();
         let influence = influence.col_as_slice(j);
         change.iter_mut().zip(influence).for_each(|(out, value)| *out = weighted * value);

@@ -57,10 +57,13 @@ impl LeftOut {
         Self { groups, rows, parts, noise }
     }
 
-    /// What all other directions miss each by; and by what part the variance of its mean is less than that of this.
+    /// What all other directions miss each by, and what the square of that holds of the variance of its mean. Of
+    /// what they hardly know they miss more than what lies between: for [`PART_KNOWN`] at most.
     pub(super) fn missed(&self) -> impl Iterator<Item = (f64, f64)> {
-        let of = |(group, part): (&Group, &f64)| (group.residual / part, *part);
-        self.groups.iter().zip(&self.parts).map(of)
+        self.groups.iter().zip(&self.parts).map(|(group, part)| {
+            let known = part.max(PART_KNOWN);
+            (group.residual / known, part / (known * known))
+        })
     }
 
     /// The variance of a group's mean by noise: as stated, or as the likeliest model has it.
@@ -78,6 +81,8 @@ impl LeftOut {
     }
 }
 
+/// Where others leave less than this part of a residual, a reading is extrapolated from afar.
+const PART_KNOWN: f64 = 0.25;
 /// Of readings that nothing else says anything of not less than this part is left.
 const PART_LEAST: f64 = 1e-6;
 /// Rows at a time.
