@@ -19,6 +19,9 @@
 //! fits are the *missed fields*, one u of an independent component each. Along a ray they count for more
 //! where the readings around it are foretold worse by all the others than the model expects: see [`Uneven`].
 //!
+//! What all these functions don't foretell of a reading from the others is missed, too, by what lies between readings:
+//! changes of the fit's own coefficients, among the missed fields.
+//!
 //! Where finer functions make the readings no likelier there is no truncation to speak of, and the
 //! fit stays as it is. What is finer than all readings nothing here can know.
 
