@@ -60,8 +60,8 @@ pub(super) fn course(
     counts.into_iter().filter_map(after).collect()
 }
 
-/// The same of a run that is read in blocks: a quarter of the readings of a point and half of them are two
-/// more, so that all of them take as long as the whole did.
+/// The same of a run that is read in blocks: half as many readings for each point further back, so that all of
+/// them together take as long as the whole did.
 pub(super) fn course_in_blocks(
     run: &LongRun<'_>,
     (region, optics): (&Region, Option<&Optics>),
