@@ -189,7 +189,7 @@ fn samples_from_elsewhere_are_refused_by_line_and_column() {
         refused(&bench, &["fit", "s.csv", "-o", "fit.json"], parts);
     };
     let below = |rows: &str| format!("{SAMPLES_HEADER}{rows}");
-    let row_3 = ["s.csv: line 3, column radiance_w_per_m2_sr", "finite number", "help:"];
+    let row_3 = ["s.csv: line 3, column radiance_w_per_m2_sr", "from -1e100 to 1e100", "help:"];
     samples(&below("0,0,0,0,1\n0,0,10,0,one\n"), &row_3);
     samples(&below("0,0,0,0,1\n0,0,10,0,nan\n"), &row_3);
     samples(&below("0,0,0,0,1\n0,0,10,0\n"), &["s.csv: line 3: 4 fields", "expected 5"]);

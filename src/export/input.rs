@@ -18,6 +18,9 @@ use crate::rig::calibration::{Flag, Flags};
 const ROWS_MAX: usize = 50_000_000;
 /// An azimuth may be stated in (-180, 180] or in [0, 360]; beyond a turn it is a slip.
 const PHI_DEG_MAX: f64 = 360.0;
+/// Of values and their u: the sums of a fit's squares stay in range.
+const VALUE_MAX: f64 = 1e100;
+const U_EXPECTED: &str = "a number greater than 0, up to 1e100";
 
 /// A sample from a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,6 +131,8 @@ pub(super) fn read_part(
     let (quantity, value) = table.quantity()?;
     let u = table.find(&format!("u_{}", quantity.radiance_column()))?;
     let flags = table.find("flags")?;
+    let is_value = |value: f64| value.abs() <= VALUE_MAX;
+    let is_u = |u: f64| u > 0.0 && u <= VALUE_MAX;
     let mut samples = Vec::new();
     while let Some(row) = table.next_row(samples.len())? {
         if let Some(first) = repeats.note(row.record, row.line + lines_before) {
@@ -136,13 +141,8 @@ pub(super) fn read_part(
         let sample = InputSample {
             line: row.line,
             ray: row.ray(&rays)?,
-            value: row.number(&value, "a finite number", f64::is_finite)?,
-            u: match &u {
-                None => None,
-                Some(u) => {
-                    Some(row.number(u, "a number greater than 0", |u| u > 0.0 && u.is_finite())?)
-                }
-            },
+            value: row.number(&value, "a number from -1e100 to 1e100", is_value)?,
+            u: u.as_ref().map(|u| row.number(u, U_EXPECTED, is_u)).transpose()?,
             flags: flags.as_ref().map_or(Flags::default(), |flags| row.flags(flags)),
         };
         samples.push(sample);
@@ -372,7 +372,9 @@ impl<'b> Table<'b> {
     }
 
     fn no_column(&self, expected: &str) -> CsvError {
-        CsvError::NoColumn { expected: expected.to_owned(), found: self.header.join(", ") }
+        let found = self.header.join(", ");
+        let found = if found.is_empty() { "none: the file is empty".to_owned() } else { found };
+        CsvError::NoColumn { expected: expected.to_owned(), found }
     }
 
     /// The one column that holds values.

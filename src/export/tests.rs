@@ -136,7 +136,7 @@ fn a_bad_file_is_refused_with_line_column_and_remedy() {
         (
             "0,0,0,0,1,0.1\n0,0,0,0,NaN,0.1",
             "line 3, column radiance_w_per_m2_sr: \"NaN\"; \
-            expected a finite number",
+            expected a number from -1e100 to 1e100",
         ),
         ("0,inf,0,0,1,0.1", "line 2, column y_mm: \"inf\"; expected a finite number"),
         (
@@ -157,9 +157,16 @@ fn a_bad_file_is_refused_with_line_column_and_remedy() {
         (
             "0,0,0,0,1,0",
             "line 2, column u_radiance_w_per_m2_sr: \"0\"; expected a number greater \
-            than 0",
+            than 0, up to 1e100",
         ),
-        ("0,0,0,0,,0.1", "line 2, column radiance_w_per_m2_sr: \"\"; expected a finite number"),
+        (
+            "0,0,0,0,-1e300,0.1",
+            "line 2, column radiance_w_per_m2_sr: \"-1e300\"; expected a number from -1e100 to 1e100",
+        ),
+        (
+            "0,0,0,0,,0.1",
+            "line 2, column radiance_w_per_m2_sr: \"\"; expected a number from -1e100 to 1e100",
+        ),
         (
             "0,0,0,0,1,1\n\n# a note\n\n0,0,0,0,1\n",
             "line 6: 5 fields; expected 6, as in the header",
@@ -191,7 +198,7 @@ fn a_bad_file_is_refused_with_line_column_and_remedy() {
             "line 1: columns x_mm and x_mm: expected one of \
             them",
         ),
-        ("", "line 1: no column x_mm; the columns are: "),
+        ("", "line 1: no column x_mm; the columns are: none: the file is empty"),
     ] {
         assert_eq!(read_samples(text.as_bytes()).unwrap_err().to_string(), message);
     }
