@@ -2,7 +2,7 @@
 //! left out is missed by it, and so, in every sum over directions, is the part of the field that the
 //! reading stands for. This is the jackknife over directions: a fit is a weighted sum of its readings; what a
 //! functional changes by where one direction's are replaced by what the others foretell is their weight in it times
-//! what they are missed by, and the squares of these changes make its variance. (MacKinnon and White 1985 as HC3: the
+//! what they are missed by, and the squares of these changes make its variance. (`MacKinnon` and White 1985 as HC3: the
 //! covariance of least squares that holds whatever the errors' variances are. It rather says too much the more
 //! of a reading is its own, since what a reading misses lies twice as far off its neighbours as what lies between.)
 
@@ -64,7 +64,7 @@ mod tests {
     fn groups() -> (Vec<f64>, Mat<f64>, Vec<f64>) {
         let part = |i: usize, by: f64| ((i + 1) as f64 * by).fract() - 0.5;
         let rows = Mat::from_fn(UNKNOWNS, 15, |k, i| part(i, [0.618, 0.414, 0.732, 0.236][k]));
-        let values = (0..15).map(|i| libm::sin(7.0 * i as f64)).collect();
+        let values = (0..15).map(|i| libm::sin(7.0 * f64::from(i))).collect();
         ((0..15).map(|i| 1.0 + f64::from(i % 3)).collect(), rows, values)
     }
 
