@@ -134,7 +134,11 @@ pub(crate) fn await_readings(bench: &Bench, run: &mut Process, readings: usize) 
     let began = Instant::now();
     while committed(bench).len() < readings {
         assert!(began.elapsed() < PATIENCE, "no {readings} readings");
-        assert!(run.0.try_wait().unwrap().is_none(), "it ended before");
+        if let Some(status) = run.0.try_wait().unwrap() {
+            let mut said = String::new();
+            run.0.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+            panic!("it ended before, {status}: {said}");
+        }
         sleep(Duration::from_millis(50));
     }
 }
