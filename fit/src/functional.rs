@@ -56,7 +56,7 @@ impl Functional {
     /// ([`crate::Penalised::truncation`]) is in it times its weight: in one direction all of it, at
     /// however many places, since it may be the same at all of them; and there the field may be
     /// rougher than elsewhere ([`crate::Uneven`]). Both are taken to be another in every direction, and
-    /// to average out of sums over several.
+    /// to average out of sums over several, but for what readings miss of each other, which is a missed field.
     pub(crate) fn along(&self) -> Option<Along> {
         self.along
     }
